@@ -55,6 +55,23 @@ def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
 
 
 @pytest.mark.parametrize(
+    ("time", "told"),
+    [
+        ("-1s", "from 0 on"),
+        ("1e300s", "at most 1e+09 s"),
+        ("9e8s", "Allowed: up to 1e+09 turns"),  # the angle has no digit left that counts
+    ],
+)
+@pytest.mark.parametrize("question", [("linearize",), ("jacobian", "--of", "rhs", "--wrt", "states")])
+def test_instants_at_which_nothing_is_known_are_refused(
+    ballpass: Callable[..., Result], question: tuple[str, ...], time: str, told: str
+) -> None:
+    done = ballpass(question[0], SCENE, *question[1:], "--time", time)
+    assert done.exit_code == 2, done.output
+    assert told in " ".join(done.output.split())
+
+
+@pytest.mark.parametrize(
     ("words", "told"),
     [
         (("--duration", "1 s", "--cycles", "2"), "both given"),

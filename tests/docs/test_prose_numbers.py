@@ -167,6 +167,8 @@ NAMED: dict[str, dict[str, str]] = {
     },
     "docs/theory/life.md": {
         "has 4200 MPa in": "a limit of the standard",
+        "a peak pressure above 4200 MPa": "a limit of the standard",
+        "above 500 000 mm/min": "ask/life_limits.py",
         "207 GPa, 0.3)": "numbers of the standard",
         "SKF's C is 5 % higher for the same balls: 16 % of life": "a comparison of catalogues",
         "with 1.044 in": "a number of the standard",
@@ -186,7 +188,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/theory/sensitivities.md": {
         "By default `rtol` is 1e-11 and": "contract/defaults.py",
         "at a tolerance of 1e-11": "contract/defaults.py",
-        "moving all parameters by 1e-7": "certificate.py",
+        "moving speed and start by 1e-7": "sensitivity_query.py",
         "(1e-3 of the derivative, plus 1e-5": "certificate.py",
         "exceeds 1e-3 of the derivative": "certificate.py",
         "to within 1e-5": "certificate.py",

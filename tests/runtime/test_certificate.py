@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
-from ballpass.runtime.certify.certificate import Verdict, by_differences, compare
+from ballpass.runtime.certify.certificate import Second, Verdict, better_known, by_differences, compare
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
@@ -86,6 +87,11 @@ def test_a_derivative_that_is_no_number_disagrees_with_one_that_is() -> None:
     assert compare(math.nan, 0.0, 1.0, 1e-9, route="x", quantum=0.0).verdict is Verdict.DISAGREES
 
 
+def jitter(at: Mapping[str, float]) -> list[dict[str, float]]:
+    """Tiny changes of all parameters."""
+    return [{name: value * (1.0 + move) for name, value in at.items()} for move in np.linspace(-2e-7, 2e-7, 5)]
+
+
 def test_differences_of_a_noisy_function_state_an_uncertainty_that_holds() -> None:
     """exp with noise of 1e-9: the stated uncertainty must cover the error, and be no more than a thousand times it."""
     generator = np.random.default_rng(3)
@@ -96,7 +102,11 @@ def test_differences_of_a_noisy_function_state_an_uncertainty_that_holds() -> No
 
     at, scales = {"a": 1.0, "b": 2.0}, np.array([1.0, 2.0])
     found = by_differences(
-        lambda changes: np.array([noisy(change) for change in changes]), at, scales, quantum=np.zeros((1, 2))
+        lambda changes: np.array([noisy(change) for change in changes]),
+        at,
+        scales,
+        quantum=np.zeros((1, 2)),
+        jitter=jitter(at),
     )
     exact = np.array([[8 * math.e, 12 * math.e]])
     error = np.abs(found.value - exact)
@@ -110,37 +120,79 @@ def test_slopes_on_both_sides_of_a_kink_are_given() -> None:
     def kinked(changes: Sequence[Mapping[str, float]]) -> np.ndarray:
         return np.array([[abs(change.get("a", 1.0) - 1.0) + 3.0 * change.get("a", 1.0)] for change in changes])
 
-    found = by_differences(kinked, {"a": 1.0}, np.array([1.0]), quantum=np.zeros((1, 1)))
+    at = {"a": 1.0}
+    found = by_differences(kinked, at, np.array([1.0]), quantum=np.zeros((1, 1)), jitter=jitter(at))
     assert found.sides(0, 0) == pytest.approx((2.0, 4.0))
     check = compare(4.0, 0.0, 3.0, 1e-9, route="x", quantum=0.0, sides=found.sides(0, 0))
     assert check.verdict is Verdict.NOT_CHECKED
     assert "2 below the parameter's value and 4 above" in check.reason
 
 
-@pytest.mark.parametrize("wrong", [{3: 1.01}, {0: 0.99, 11: 1.01}, {7: -1.0}, {5: 1.002, 6: 0.998}])
-def test_a_wrong_derivative_among_many_right_ones_does_not_hide(wrong: Mapping[int, float]) -> None:
-    """Twelve parameters of like effect, moved together: who is wrong disagrees, who is right is verified."""
-    size = np.linspace(1.0, 3.0, 12)
+def test_what_is_found_of_a_pair_does_not_depend_on_the_others() -> None:
+    """A smooth, a noisy, a sharply bent and a kinked function by two parameters, alone and together."""
+    functions: tuple[Callable[[float, float], float], ...] = (
+        lambda a, b: math.exp(a) * b,
+        lambda a, b: a * b + 1e-7 * math.sin(1e9 * (a + b)),
+        lambda a, b: math.sin(3e3 * a) + b,
+        lambda a, b: abs(a - 1.0) + b**2,
+    )
+    at, moves = {"a": 1.0, "b": 2.0}, jitter({"a": 1.0, "b": 2.0})
 
-    def measure(changes: Sequence[Mapping[str, float]]) -> np.ndarray:
-        calls.append(len(changes))
-        points = [[change.get(f"p{k}", 1.0) for k in range(12)] for change in changes]
-        return np.exp(0.1 * np.array(points) @ size)[:, None]
+    def found(chosen: Sequence[int], names: Sequence[str]) -> Second:
+        def measure(changes: Sequence[Mapping[str, float]]) -> np.ndarray:
+            points = [(change.get("a", 1.0), change.get("b", 2.0)) for change in changes]
+            return np.array([[functions[k](*point) for k in chosen] for point in points])
 
-    calls: list[int] = []
-    exact = 0.1 * size * math.exp(0.1 * float(np.sum(size)))
-    slopes = exact * np.array([wrong.get(k, 1.0) for k in range(12)])
-    at, quantum = {f"p{k}": 1.0 for k in range(12)}, np.full((1, 12), 1e-5 * math.exp(0.1 * float(np.sum(size))))
-    right = by_differences(measure, at, np.ones(12), quantum=quantum, slopes=exact[None])
-    alone = sum(calls)
-    assert np.max(np.abs(right.value[0] / exact - 1.0)) < 1e-6
-    found = by_differences(measure, at, np.ones(12), quantum=quantum, slopes=slopes[None])
-    assert sum(calls) > 2 * alone
-    for k in range(12):
-        check = compare(
-            slopes[k], 0.0, found.value[0, k], found.uncertainty[0, k], route="x", quantum=float(quantum[0, k])
-        )
-        assert check.verdict is (Verdict.DISAGREES if k in wrong else Verdict.VERIFIED), k
+        given = {name: at[name] for name in names}
+        quantum = np.full((len(chosen), len(names)), 1e-5)
+        return by_differences(measure, given, np.array(list(given.values())), quantum=quantum, jitter=moves)
+
+    together = found(range(4), "ab")
+    for row in range(4):
+        for column, name in enumerate("ab"):
+            alone = found([row], [name])
+            for of in ("value", "uncertainty", "below", "above"):
+                assert getattr(alone, of)[0, 0] == pytest.approx(getattr(together, of)[row, column], rel=0, nan_ok=True)
+    assert together.sides(3, 0) is not None
+
+
+@pytest.mark.parametrize(
+    ("derivative", "own", "second", "uncertainty", "given", "by_second"),
+    [
+        (-33.8487, 0.02, -33.873901, 6e-6, -33.873901, True),  # verified to 1e-3, and one is known to 1e-7
+        (1.0, 1e-9, 1.0005, 1e-6, 1.0, False),  # verified
+        (1.0, 1e-3, 1.1, 1e-6, 1.1, True),  # they disagree, and one is known better
+        (1.0, 1e-6, 1.1, 1e-3, 1.0, False),
+        (-1.6e12, 4e10, -4e6, 4e7, math.nan, True),  # no digit in common, and they exclude each other
+        (1e4, 3e4, 5.0, 1e-3, 5.0, True),  # not checked: the first is not known, the second is
+        (5.0, 10.0, -3.0, 8.0, math.nan, False),  # not checked: neither is known
+        (math.nan, 0.0, 2.0, 1e-6, 2.0, True),
+        (2.0, 1e-6, math.nan, math.inf, 2.0, False),
+    ],
+)
+def test_the_number_known_better_is_given_and_none_where_nothing_is_known(
+    derivative: float, own: float, second: float, uncertainty: float, given: float, *, by_second: bool
+) -> None:
+    check = compare(derivative, own, second, uncertainty, route="x", quantum=0.0)
+    value, _, of_second = better_known(derivative, own, check)
+    assert value == pytest.approx(given, rel=0, nan_ok=True)
+    assert of_second is by_second
+
+
+@pytest.mark.parametrize(("own", "second"), [(1.6e-2, 1e-9), (1e-9, 1.6e-2), (3e-2, 3e-2), (0.0, 1.0)])
+def test_the_reason_of_an_open_verdict_is_true(own: float, second: float) -> None:
+    """Each comparison that it states holds."""
+    for apart in (0.0, 2.5e-3, 3e-2):
+        check = compare(1.0 + apart, own, 1.0, second, route="x", quantum=0.0)
+        numbers = [float(text) for text in re.findall(r"\d\.\de[-+]\d+", check.reason)]
+        if check.verdict is not Verdict.NOT_CHECKED:
+            continue
+        if "differ by" in check.reason:
+            distance, allowed, *uncertainties = numbers
+            assert allowed < distance <= 4.0 * sum(uncertainties) * 1.05
+        else:
+            uncertainty, allowed = numbers
+            assert uncertainty > allowed
 
 
 @pytest.mark.long
@@ -175,8 +227,9 @@ def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
     monkeypatch.setattr(QuantityRun, "differentiate", wrong)
     found = model.sensitivity(*names, **options)  # type: ignore[arg-type]
     (pair,) = found.disagreements
-    assert pair.check.value == pytest.approx(right.pairs[0].derivative, rel=1e-5)
-    assert pair.derivative == pytest.approx(1.01 * right.pairs[0].derivative, rel=1e-12)
+    assert pair.check.value == pytest.approx(right.pairs[0].by_steps, rel=1e-5)
+    assert pair.by_steps == pytest.approx(1.01 * right.pairs[0].by_steps, rel=1e-12)
+    assert pair.derivative in (pair.by_steps, pair.check.value)
 
 
 @pytest.mark.long

@@ -187,6 +187,27 @@ def test_an_odd_number_of_balls_at_rest_has_two_slopes_and_decays_by_their_mean(
         model.jacobian("ball.damping_force", "states", x=result.x, parameters=AT_REST)
 
 
+def test_a_ball_that_parts_slowly_damps_half_of_any_faster_vibration(make_virtual: Callable[..., Model]) -> None:
+    """One loaded ball, just behind the load line, that parts: ratio 0, and half of c_b for all that vibrates faster."""
+    model = make_virtual(
+        "varying_compliance",
+        ('law = "none"', 'law = "one-sided-gated"\ncoefficient = "2e3 N*s/m"'),
+        ('damping = "200 N*s/m"', 'damping = "0 N*s/m"'),
+    )
+    numbers = {"shaft.speed": 1e-2, "bearing.clearance": 1e-3}
+    behind = [5e-4 + (196.0 / model.constants()["bearing.k_b"]) ** (2 / 3), -1e-9, 0.0, 0.0]
+    with pytest.warns(KinkWarning, match="damps half of the time"):
+        result = model.linearize(x=behind, parameters=numbers)
+    assert 0.0 < result.passing < 1e-5
+    bounce, faster = result.modes[-1], result.faster_modes[-1]
+    expected = 0.5 * 2e3 / (2.0 * 20.0 * 2.0 * math.pi * bounce.natural_frequency)
+    assert abs(bounce.damping_ratio) < 1e-3 * expected
+    assert faster.damping_ratio == pytest.approx(expected, rel=1e-3)
+    report = result.to_json()
+    assert report["faster_modes"][-1]["damping_ratio"]["value"] == faster.damping_ratio
+    assert "vibrations faster than" in str(result.report())
+
+
 def test_command_prints_frequencies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rotor: Model) -> None:
     monkeypatch.chdir(tmp_path)
     scene = str(ROOT / "scenes/varying_compliance.toml")

@@ -84,3 +84,9 @@ def test_changes_are_those_of_single_runs_and_times_are_gained(
     assert "times as fast" in found.words
     assert np.shape(rows(found)[1]) == (2, 6)
     assert to_plain(found)["simplification"]["units"] == {PEAK: "N", "rms:inner.vy": "m/s"}
+    # life is counted in turns, of a variant whose outputs do not name the ball force as well
+    variant = load(generate(read_scene(SCENES / "punching_press.toml", coupling="two-way"), tmp_path / "variant"))
+    assert "ball.force" not in variant.outputs
+    lives = measure_simplification(variant, simpler, ["life"], members=2, spread=1e-9)
+    assert lives.units == {"life": "turns"}
+    assert lives.values["life"] == pytest.approx(variant.quantities("life")["life"].value, rel=1e-3)

@@ -66,6 +66,7 @@ class BearingStrength(ShortRepr):
     lives : L_10r of ISO 16281 by reading [turns]; empty where there is none
     viscosity_ratio, contamination : κ and e_C [1], None where the scene does not give them
     factor, modified_life : a_ISO [1] and L_nmr [turns] of the governing reading, likewise
+    beyond : limits of these numbers that it is beyond, sentences
 
     Examples
     --------
@@ -96,6 +97,7 @@ class BearingStrength(ShortRepr):
     contamination: float | None
     factor: float | None
     modified_life: float | None
+    beyond: tuple[str, ...] = ()
 
     @property
     def governing(self) -> str:

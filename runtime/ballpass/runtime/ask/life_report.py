@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.ask.life_limits import limits_of
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, RingStrength, StateStrength
 from ballpass.runtime.ask.life_text import LifeReport
 from ballpass.runtime.ask.wear import LoadSamples, load_samples, wear_field
@@ -114,7 +115,7 @@ def _bearing(
     load = float(np.mean(samples.resultant**3)) ** (1.0 / 3.0)
     ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
-    return BearingStrength(
+    strength = BearingStrength(
         name=info.name,
         dynamic_rating=float(ratings.dynamic),
         static_rating=float(ratings.static),
@@ -138,6 +139,7 @@ def _bearing(
         factor=factor,
         modified_life=modified,
     )
+    return replace(strength, beyond=tuple(limits_of(info, values, strength)))
 
 
 def static_safety(balls: int, static_rating: float, force: float) -> float:

@@ -54,6 +54,16 @@ class LifeReport(Reported):
             if not state.settled
         )
 
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Limits of these numbers that bearings are beyond, sentences."""
+        return tuple(
+            f"{' '.join(filter(None, ('Bearing', bearing.name, state.name and f'in state {state.name}')))}: {words}"
+            for state in self.states
+            for bearing in state.bearings
+            for words in bearing.beyond
+        )
+
     def _report(self) -> Report:
         facts = asdict(self)
         for state, plain in zip(self.states, facts["states"], strict=True):
@@ -87,7 +97,7 @@ class LifeReport(Reported):
             facts=facts,
             records=records,
             index=("state", "bearing", "reading"),
-            warnings=(*self.unsettled, *dict.fromkeys(swinging)),
+            warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
         )
 
     def __repr__(self) -> str:

@@ -41,11 +41,8 @@ TRIANGLES, HALVINGS = 3, 3
 #: Slopes on both sides of a parameter's value that differ by so many times what is allowed are those of a kink.
 KINK = 5.0
 
-#: Parameters that are moved together: the most of them, the smallest effect relative to the largest, and how often.
-TOGETHER, SPREAD, VECTORS = 8, 1e-2, 2
-
-#: Relative change of parameters that shows the noise of a run: what step sizes that are chosen anew do to its values.
-JITTER, JITTERED = 1e-7, 5
+#: Two numbers that are apart by more than this part of the larger one have no digit in common [1].
+WILD = 0.5
 
 #: Parameters that differ from those of a run, and what it measures of all quantities, shape (runs, quantities).
 Measure = Callable[[Sequence[Mapping[str, float]]], Array]
@@ -131,8 +128,8 @@ def compare(
         why = "the derivative is no finite number" if fine else "the second route gives no finite number"
         return Check(
             route=route,
-            value=None,
-            uncertainty=None,
+            value=second if fine else None,
+            uncertainty=uncertainty if fine else None,
             disagreement=None,
             verdict=Verdict.DISAGREES if fine else Verdict.NOT_CHECKED,
             reason=why,
@@ -148,9 +145,16 @@ def compare(
         explained = CAUTION * (own_uncertainty + uncertainty)
         verdict = Verdict.DISAGREES if apart > explained else Verdict.NOT_CHECKED
         if verdict is Verdict.NOT_CHECKED:
-            reason = _blame(own_uncertainty, uncertainty, allowed)
+            reason = (
+                f"the routes differ by {apart:.1e} where {allowed:.1e} is allowed, which their uncertainties "
+                f"({own_uncertainty:.1e} and {uncertainty:.1e}) explain: {_remedy(own_uncertainty > uncertainty)}"
+            )
     elif uncertainty > allowed:
-        verdict, reason = Verdict.NOT_CHECKED, _blame(own_uncertainty, uncertainty, allowed)
+        verdict = Verdict.NOT_CHECKED
+        reason = (
+            f"the second route is uncertain by {uncertainty:.1e}, more than the {allowed:.1e} that is allowed: "
+            + _remedy(False)
+        )
     return Check(
         route=route,
         value=second,
@@ -164,17 +168,31 @@ def compare(
     )
 
 
-def _blame(own: float, second: float, allowed: float) -> str:
-    """Which number is not known well enough, and what may help."""
-    if own > second:
-        return (
-            f"the derivative itself is uncertain by {own:.1e}, more than the {allowed:.1e} that is allowed: take a "
-            "tighter sensitivity_rtol or fewer turns, or see whether the motion is chaotic"
-        )
-    return (
-        f"the second route is uncertain by {second:.1e}, more than the {allowed:.1e} that is allowed: grazing contact, "
-        "a chaotic motion, or a tolerance that is too loose"
-    )
+def _remedy(first: bool) -> str:
+    """What may help where the first, or the second, number is not known well enough."""
+    if first:
+        return "take a tighter sensitivity_rtol or fewer turns, or see whether the motion is chaotic"
+    return "grazing contact, a chaotic motion, or a tolerance that is too loose"
+
+
+def better_known(derivative: float, own_uncertainty: float, check: Check) -> tuple[float, float, bool]:
+    """The number to give: that which is known better, its uncertainty, and whether it is the second one.
+
+    NaN where nothing is known: the routes have no digit in common, and neither is known to one or they exclude each
+    other.
+    """
+    value, uncertainty = check.value, check.uncertainty
+    if value is None or uncertainty is None or check.sides is not None:
+        return derivative, own_uncertainty, False
+    cautious = CAUTION * uncertainty
+    second = cautious < own_uncertainty or not np.isfinite(derivative)
+    best = (value, cautious, True) if second else (derivative, own_uncertainty, False)
+    wild = not abs(derivative - value) <= WILD * max(abs(derivative), abs(value))
+    if check.verdict is Verdict.VERIFIED or not wild or not np.isfinite(derivative):
+        return best
+    if check.verdict is Verdict.NOT_CHECKED and best[1] <= WILD * abs(best[0]):
+        return best
+    return np.nan, best[1], best[2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -203,15 +221,12 @@ def by_differences(
     scales: Array,
     *,
     quantum: Array,
+    jitter: Sequence[Mapping[str, float]],
     agreement: float = AGREEMENT,
-    slopes: Array | None = None,
 ) -> Second:
     """Derivatives of quantities by Richardson-extrapolated central differences, with step control.
 
-    Where derivatives are given, parameters are moved together first: groups of those of about one effect, each moved
-    by so much that it has its share, up or down by chance, twice with other signs.  What such a difference and the sum
-    of the given derivatives are apart is held against each of the group as if it was all its own.  Parameters for which
-    that is too much, or not known well enough, are moved alone.
+    What is found of a pair of quantity and parameter does not depend on the other pairs.
 
     Parameters
     ----------
@@ -219,59 +234,56 @@ def by_differences(
     at : values of the parameters to differentiate by
     scales : change of each that is a large one, shape (parameters,)
     quantum : derivatives that count as nothing, shape (quantities, parameters)
+    jitter : tiny changes, evenly spaced and the middle one none, that show the noise of a run: what step sizes that are
+        chosen anew do to its values
     agreement : relative disagreement that will be allowed [1]
-    slopes : the derivatives that are to be checked, shape (quantities, parameters)
     """
     names, centre = list(at), np.array(list(at.values()))
-    jitter = measure(_jittered(at, scales))
-    noise, quantities = _noise(jitter), jitter[len(jitter) // 2]
+    jittered = measure(jitter)
+    noise, quantities = _noise(jittered), jittered[len(jittered) // 2]
     value, error = np.full(quantum.shape, np.nan), np.full(quantum.shape, np.inf)
     below, above = np.full(quantum.shape, np.nan), np.full(quantum.shape, np.nan)
-    left = np.arange(len(names))
-    if slopes is not None and len(names) > TOGETHER:
-        value, error = _together(measure, names, centre, scales, slopes, quantum, noise)
-        allowed = agreement * np.maximum(np.abs(slopes), np.abs(value)) + quantum
-        vouched = (np.abs(value - slopes) <= allowed) & (error <= allowed)
-        left = np.flatnonzero(~np.all(vouched, axis=0))
-        value[:, left], error[:, left] = np.nan, np.inf
-    step = np.full(len(names), FIRST_STEP)
+    step, wanting = np.full(quantum.shape, FIRST_STEP), np.ones(quantum.shape, dtype=bool)
+    halves = 0.5 ** np.arange(HALVINGS)
     for tried in range(1, TRIANGLES + 1):
-        if not len(left):
+        # each parameter is moved by the steps that any of its quantities asks for
+        moves = [(k, size) for k in range(len(names)) for size in np.unique(step[wanting[:, k], k]).tolist()]
+        if not moves:
             break
-        halves = 0.5 ** np.arange(HALVINGS)
-        reach = (step * scales)[left, None] * halves
-        upper, lower = centre[left, None] + reach, centre[left, None] - reach
+        reach = np.array([size * scales[k] * halves for k, size in moves])
+        places = centre[[k for k, _ in moves], None]
+        upper, lower = places + reach, places - reach
         changes = [
             {names[k]: moved}
             for side in (upper, lower)
-            for k, row in zip(left, side.tolist(), strict=True)
+            for (k, _), row in zip(moves, side.tolist(), strict=True)
             for moved in row
         ]
-        table = measure(changes).reshape(2, len(left), HALVINGS, len(noise))
-        poor = np.zeros(len(left), dtype=bool)
-        for place, k in enumerate(left.tolist()):
-            triangle = extrapolated(table[0, place], table[1, place], (upper - lower)[place], noise)
+        table = measure(changes).reshape(2, len(moves), HALVINGS, len(noise))
+        asked = wanting.copy()
+        for place, (k, size) in enumerate(moves):
+            mine = asked[:, k] & (step[:, k] == size)
+            width = (upper - lower)[place]
+            triangle = extrapolated(table[0, place], table[1, place], width, noise)
             # triangles that exclude each other know no more than their distance
             apart = np.nan_to_num(np.abs(triangle.value - value[:, k]))
             apart = np.where(apart > triangle.error + error[:, k], apart, 0.0)
-            fresh, error[:, k] = np.maximum(triangle.error, apart), np.maximum(error[:, k], apart)
-            better = fresh < error[:, k]
-            sides = _sides(quantities, table[:, place], 0.5 * (upper - lower)[place])
-            allowed = (
-                agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / (upper - lower)[place, -1]
-            )
-            kinked = better & (np.abs(sides[1] - sides[0]) > KINK * allowed)
-            below[:, k] = np.where(better, np.where(kinked, sides[0], np.nan), below[:, k])
-            above[:, k] = np.where(better, np.where(kinked, sides[1], np.nan), above[:, k])
-            value[:, k] = np.where(better, triangle.value, value[:, k])
-            error[:, k] = np.where(better, fresh, error[:, k])
-            wanting = error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k])
-            poor[place] = np.any(wanting)
+            fresh = np.maximum(triangle.error, apart)
+            known = np.maximum(error[:, k], apart)
+            better = mine & (fresh < known)
+            sides = _sides(quantities, table[:, place], 0.5 * width)
+            allowed = agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / width[-1]
+            kinked = np.abs(sides[1] - sides[0]) > KINK * allowed
+            below[better, k] = np.where(kinked, sides[0], np.nan)[better]
+            above[better, k] = np.where(kinked, sides[1], np.nan)[better]
+            value[better, k] = triangle.value[better]
+            error[mine, k] = np.where(better, fresh, known)[mine]
+            wanting[mine, k] = (error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k]))[mine]
             # noise over the width of the smallest difference, twice as `extrapolated` counts it
-            share = 2.0 * noise[wanting] / (upper - lower)[place, -1]
-            noisy = bool(np.any(share > 0.2 * error[wanting, k]))
-            step[k] = FIRST_STEP * (LARGER if noisy and tried == 1 else SMALLER ** (tried if not noisy else tried - 1))
-        left = left[poor]
+            noisy = 2.0 * noise / width[-1] > 0.2 * error[:, k]
+            larger = noisy & (tried == 1)
+            factor = np.where(larger, LARGER, SMALLER ** (tried - noisy.astype(float)))
+            step[mine, k] = (FIRST_STEP * factor)[mine]
     return Second(route="differences", value=value, uncertainty=error, quantities=quantities, below=below, above=above)
 
 
@@ -284,62 +296,6 @@ def _sides(here: Array, table: Array, reach: Array) -> Array:
     finer = 2.0 * slopes[:, 1:] - slopes[:, :-1]
     known = np.max(np.abs(finer[:, -1] - finer[:, -2]), axis=0) < 0.1 * np.abs(finer[0, -1] - finer[1, -1])
     return np.asarray(np.where(known, finer[::-1, -1], np.mean(finer[:, -1], axis=0)))
-
-
-def _together(
-    measure: Measure,
-    names: Sequence[str],
-    centre: Array,
-    scales: Array,
-    slopes: Array,
-    quantum: Array,
-    noise: Array,
-) -> tuple[Array, Array]:
-    """Derivatives by differences along groups of parameters, the other ones of a group taken as given; uncertainties.
-
-    The worse of both sign vectors, shapes (quantities, parameters).
-    """
-    # relative change of the quantities by a large change of the parameter; below the quantum none is told apart
-    effect = np.nan_to_num(np.max(FLOOR * np.maximum(np.abs(slopes), quantum) / quantum, axis=0), nan=1.0, posinf=1.0)
-    signs, moves = np.random.default_rng(1), []
-    for group in _groups(effect):
-        share = scales[group] * effect[group[-1]] / effect[group]
-        moves += [(group, share * signs.choice((-1.0, 1.0), len(group))) for _ in range(VECTORS)]
-    halves = np.array([FIRST_STEP * 0.5**k for k in range(HALVINGS)])
-    changes = [
-        {names[k]: float(centre[k] + side * half * shift) for k, shift in zip(group, move, strict=True)}
-        for group, move in moves
-        for side in (1.0, -1.0)
-        for half in halves.tolist()
-    ]
-    table = measure(changes).reshape(len(moves), 2, HALVINGS, len(noise))
-    value, error = slopes.copy(), np.zeros(slopes.shape)
-    for (group, move), (upper, lower) in zip(moves, table, strict=True):
-        found = extrapolated(upper, lower, 2.0 * halves, noise)
-        apart = (found.value - slopes[:, group] @ move)[:, None] / move
-        worse = np.abs(apart) >= np.abs(value - slopes)[:, group]
-        value[:, group] = np.where(worse, slopes[:, group] + apart, value[:, group])
-        error[:, group] = np.maximum(error[:, group], found.error[:, None] / np.abs(move))
-    return value, error
-
-
-def _groups(effect: Array) -> list[NDArray[np.int_]]:
-    """Parameters of about one effect, strongest first."""
-    groups: list[list[int]] = []
-    for k in np.argsort(-effect, kind="stable").tolist():
-        if not groups or len(groups[-1]) == TOGETHER or effect[k] < SPREAD * effect[groups[-1][0]]:
-            groups.append([])
-        groups[-1].append(k)
-    return [np.array(group) for group in groups]
-
-
-def _jittered(at: Mapping[str, float], scales: Array) -> list[dict[str, float]]:
-    """Tiny changes of all parameters together."""
-    moves = JITTER * np.arange(-(JITTERED // 2), JITTERED // 2 + 1)
-    return [
-        {name: value + move * scale for (name, value), scale in zip(at.items(), scales.tolist(), strict=True)}
-        for move in moves.tolist()
-    ]
 
 
 def _noise(values: Array) -> Array:

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.certify.certificate import (
     AGREEMENT,
-    CAUTION,
     FLOOR,
     UNCHECKED,
-    Verdict,
+    better_known,
     by_differences,
     compare,
 )
@@ -58,6 +57,9 @@ Array = NDArray[np.float64]
 
 #: How much rougher panels of quadratures may be in the looser run beside.
 COARSER = 4.0
+
+#: Relative change of speed and start that shows the noise of a run, and how often it is made [1].
+JITTER, JITTERED = 1e-7, 5
 
 #: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
@@ -194,8 +196,8 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             {name: numbers.parameters[name] for name in names},
             difference_scales,
             quantum=quantum,
+            jitter=_jittered(run),
             agreement=query.agreement,
-            slopes=slopes,
         )
         with np.errstate(invalid="ignore", divide="ignore"):
             # the difference of the routes gives the uncertainty of quadratures and extremes
@@ -218,16 +220,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     agreement=query.agreement,
                     sides=second.sides(row, column),
                 )
-            known = float(own[row, column])
-            # of two numbers that nobody vouches for, the one that is known better
-            better = (
-                check.verdict is Verdict.NOT_CHECKED
-                and check.value is not None
-                and check.uncertainty is not None
-                and CAUTION * check.uncertainty < known
-            )
-            if better:
-                derivative, known = float(check.value or 0.0), CAUTION * float(check.uncertainty or 0.0)
+            derivative, known, by_second = better_known(derivative, float(own[row, column]), check)
             pairs.append(
                 Sensitivity(
                     quantity=quantity.name,
@@ -239,7 +232,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
                     scale=float(difference_scales[column]),
                     uncertainty=known if query.check else None,
-                    route=check.route if better else STEPS,
+                    route=check.route if by_second else STEPS,
                     by_steps=float(slopes[row, column]),
                     check=check,
                 )
@@ -305,6 +298,17 @@ def _difference_scales(run: Run, names: Sequence[str]) -> Array:
             value = position if units[name] == "m" else max(alike, default=0.0)
         scales.append(value or 1.0)
     return np.array(scales)
+
+
+def _jittered(run: Run) -> list[dict[str, float]]:
+    """Tiny changes of speed and start, whatever is differentiated: they move every step."""
+    manifest, parameters = run.model.manifest, run.numbers.parameters
+    scales = dict(zip(manifest.initial, run.magnitude.tolist(), strict=False))
+    speed = driver_angle.speed_name(manifest)
+    if speed is not None and speed in parameters:
+        scales[speed] = abs(parameters[speed])
+    moves = JITTER * np.arange(-(JITTERED // 2), JITTERED // 2 + 1)
+    return [{name: parameters[name] + move * scale for name, scale in scales.items()} for move in moves.tolist()]
 
 
 def _grazing(

@@ -43,7 +43,8 @@ class Sensitivity:
     ----------
     quantity, parameter : names
     value, parameter_value : numbers
-    derivative, unit : dQ/dp; where nothing vouches for either route's number, the one that is known better
+    derivative, unit : dQ/dp, by the route that is known better; NaN where nothing is known: neither is verified, and
+        they have no digit in common
     dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
     scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
         zero, what positions move by in the run, or the largest value of its unit
@@ -187,7 +188,7 @@ class SensitivityReport(Reported):
         first = self.disagreements[0]
         return (
             f"{len(self.disagreements)} of {len(self.pairs)} derivatives disagree with their second route, "
-            f"{first.check.route}, first d({first.quantity})/d({first.parameter}): {first.derivative:.9g} and "
+            f"{first.check.route}, first d({first.quantity})/d({first.parameter}): {first.by_steps:.9g} and "
             f"{_number(first.check.value)} {first.unit}. "
             "Do not rely on them; take a tighter --rtol and --sensitivity-rtol, or fewer turns."
         )
@@ -237,8 +238,9 @@ def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
     Parameters that are zero have none and stand apart, ranked by dQ/dp times a natural change of the parameter.
     """
     ranked = report.of(quantity.name)
-    rows = _rows([pair for pair in ranked if math.isfinite(pair.dimensionless)])
-    without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
+    zero = [pair for pair in ranked if pair.value == 0.0 or pair.parameter_value == 0.0]
+    rows = _rows([pair for pair in ranked if pair not in zero])
+    without = zero
     sections = [len(rows)] if without else []
     if without:
         what = "quantity" if quantity.value == 0.0 else "parameter"
@@ -273,16 +275,18 @@ def _title(quantity: QuantityValue) -> str:
 def _row(pair: Sensitivity) -> tuple[Words, ...]:
     check = pair.check
     relative = f"{pair.dimensionless:+z.4f}" if math.isfinite(pair.dimensionless) else "–"
-    size = max(abs(pair.derivative), abs(check.value or 0.0))
+    size = max(abs(pair.by_steps), abs(check.value or 0.0))
     apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
     number, words = f"{pair.derivative:z.4g}", check.verdict.value
     if pair.is_nothing:
         # digits that no check verifies are not shown
         relative = "~0" if math.isfinite(pair.dimensionless) else relative
         number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
+    elif math.isnan(pair.derivative):
+        number, words = "unknown", f"{words}: no digit in common"
     elif check.sides is not None:
         number, words = f"{check.sides[0]:z.4g} | {check.sides[1]:z.4g}", "kink: below | above"
-    elif check.verdict is Verdict.NOT_CHECKED and pair.uncertainty is not None:
+    elif check.verdict is not Verdict.VERIFIED and pair.uncertainty is not None:
         number = _known(pair.derivative, pair.uncertainty)
         words += "" if pair.route == STEPS else f": by {pair.route}"
     elif check.bounded:

@@ -178,6 +178,7 @@ Instant = Annotated[
         example='"0.08 s"',
         shown="TIME",
         unit="s",
+        least=0.0,
         flags=("--time",),
     ),
 ]

@@ -28,6 +28,7 @@ from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
+from ballpass.runtime.run.request import check_length
 
 Array = NDArray[np.float64]
 
@@ -207,7 +208,11 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
     if t is not None and crank_angle is not None:
         raise RequestError("Both t and crank_angle were given. Allowed: one of the two.")
     if crank_angle is None:
-        return checked_time(0.0 if t is None else t)
+        time = checked_time(0.0 if t is None else t)
+        if time < 0.0:
+            raise RequestError(f"t: {t!r} s lies before the start. Allowed: times from 0 s on.")
+        check_length(time, driver_angle.period(model.manifest, numbers.values))
+        return time
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
         raise RequestError(

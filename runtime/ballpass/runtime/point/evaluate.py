@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unch
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembled
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.request import no_output
+from ballpass.runtime.run.request import MOST_TIME, no_output
 
 
 def evaluate_point(
@@ -75,8 +74,8 @@ def point(
 
 
 def checked_time(t: float) -> float:
-    """A finite time [s]; RequestError for anything else."""
+    """A time [s] at which angles have digits left; RequestError for anything else."""
     value = real(t)
-    if not math.isfinite(value):
-        raise RequestError(f"t: a finite time [s] is expected, not {t!r}.")
+    if not abs(value) <= MOST_TIME:
+        raise RequestError(f"t: a time [s] of at most {MOST_TIME:g} s is expected, not {t!r}.")
     return value

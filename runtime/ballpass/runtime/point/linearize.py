@@ -36,6 +36,12 @@ Array = NDArray[np.float64]
 #: Eigenvalues below this fraction of the largest are zero but for rounding [1].
 RIGID = 1e-7
 
+#: How much faster than any ball's deflection changes at rest a vibration is whose balls all change sides [1].
+FASTER = 1e3
+
+#: Damping that differs by more than this depends on how fast the vibration is [1].
+ALIKE = 1e-3
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mode:
@@ -84,6 +90,9 @@ class Linearization(Reported):
     at_equilibrium : whether the state is the static equilibrium of that instant
     unbalanced : accelerations left at the state, largest [m/s^2]
     notes : what does not hold without reserve, for people
+    passing : fastest rate of a ball's deflection while the rings rest; 0 where the law has no corner there [m/s]
+    faster_modes : modes of vibrations in which balls approach faster than `passing` and part as fast: under a law that
+        damps on one side each ball damps half of the time; empty where that makes no difference
 
     Examples
     --------
@@ -102,6 +111,8 @@ class Linearization(Reported):
     at_equilibrium: bool
     unbalanced: float
     notes: tuple[str, ...]
+    passing: float = 0.0
+    faster_modes: tuple[Mode, ...] = ()
 
     def __repr__(self) -> str:
         frequencies = ", ".join(f"{m.natural_frequency:.6g}" for m in self.modes)
@@ -135,14 +146,17 @@ class Linearization(Reported):
         return self.to_json()
 
     def _report(self) -> Report:
-        modes = [
-            {
-                "natural_frequency": mode.natural_frequency,
-                "damped_frequency": mode.damped_frequency,
-                "damping_ratio": mode.damping_ratio,
-            }
-            for mode in self.modes
-        ]
+        modes, faster = (
+            [
+                {
+                    "natural_frequency": mode.natural_frequency,
+                    "damped_frequency": mode.damped_frequency,
+                    "damping_ratio": mode.damping_ratio,
+                }
+                for mode in found
+            ]
+            for found in (self.modes, self.faster_modes)
+        )
         units = {"natural_frequency": "Hz", "damped_frequency": "Hz", "damping_ratio": "1"}
         facts = {
             "time": {"value": self.time, "unit": "s"},
@@ -160,9 +174,14 @@ class Linearization(Reported):
                 }
                 for mode, numbers in zip(self.modes, modes, strict=True)
             ],
+            "passing": {"value": self.passing, "unit": "m/s"},
+            "faster_modes": [
+                {name: {"value": value, "unit": units[name]} for name, value in numbers.items()} for numbers in faster
+            ],
             "notes": list(self.notes),
         }
-        return Report(parts=(_modes_table(self), _matrices_table(self)), facts=facts, records=modes)
+        tables = (_modes_table(self), *_faster_table(self), _matrices_table(self))
+        return Report(parts=tables, facts=facts, records=modes)
 
 
 def linearize(
@@ -189,7 +208,13 @@ def linearize(
     mass = mass_matrix(model, there)
     stiffness, damping = -mass @ jacobian[half:, :half], -mass @ jacobian[half:, half:]
     state = np.asarray(there["x"], dtype=float)
+    modes = _modes(mass, damping, stiffness)
+    passing, other = _faster_damping(model, numbers, there, mass, damping, t)
+    differ = np.max(np.abs(other - damping)) > ALIKE * np.max(np.abs(other))
+    faster = _modes(mass, other, stiffness) if differ else ()
     notes = (*_sides(found, mass, model.states[:half]), *onset_notes(model, there))
+    if faster:
+        notes += (_faster_note(model, modes, faster, passing),)
     for note in notes:
         warnings.warn(f"linearize: {note}", KinkWarning, stacklevel=3)
     return Linearization(
@@ -197,12 +222,57 @@ def linearize(
         mass=mass,
         damping=damping,
         stiffness=stiffness,
-        modes=_modes(mass, damping, stiffness),
+        modes=modes,
         x=state,
         time=t,
         at_equilibrium=at_equilibrium,
         unbalanced=float(np.max(np.abs(model.kernel("rhs")(there)[half:]))),
         notes=notes,
+        passing=passing,
+        faster_modes=faster,
+    )
+
+
+def _faster_damping(
+    model: LoadedModel, numbers: Numbers, there: Point, mass: Array, damping: Array, t: float
+) -> tuple[float, Array]:
+    """Fastest rate of a ball's deflection at a state [m/s], and the damping of vibrations much faster than that.
+
+    That is the mean over both directions in which a coordinate moves; `damping` itself where no law has a corner at
+    rest, or no ball a rate.
+    """
+    half, x = len(mass), np.asarray(there["x"], dtype=float)
+    passing, reach = 0.0, np.zeros(half)
+    for bearing in model.manifest.bearings:
+        if bearing.damping.corner_at_rest:
+            rate = float(np.max(np.abs(Deflections(model, bearing, there).rate)))
+            passing = max(passing, rate)
+            (rows,) = rows_of(model, f"{bearing.prefix}ball.deflection")
+            by_states = model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
+            reach = np.maximum(reach, np.max(np.abs(by_states[:, :half]), axis=0))
+    found = damping.copy()
+    for k, moved in enumerate(reach.tolist()):
+        # the driver's speed is no vibration
+        if passing == 0.0 or moved == 0.0 or model.manifest.coordinates[k].kind == "angle":
+            continue
+        found[:, k] = 0.0
+        for side in (1.0, -1.0):
+            fast = x.copy()
+            fast[half + k] += side * FASTER * passing / moved
+            directions = directions_of(model, numbers, STATES, t)
+            slope = slopes(model, rows_of(model, RHS), directions, {**there, "x": fast}).value
+            found[:, k] -= 0.5 * (mass @ slope[half:, half + k])
+    return passing, found
+
+
+def _faster_note(model: LoadedModel, modes: Sequence[Mode], faster: Sequence[Mode], passing: float) -> str:
+    laws = {bearing.damping.law for bearing in model.manifest.bearings if bearing.damping.corner_at_rest}
+    least, other = (min((m.damping_ratio for m in some if not m.rigid), default=math.nan) for some in (modes, faster))
+    return (
+        f"the law {' and '.join(sorted(laws))} damps approach only, and the balls pass at up to {passing:.2g} m/s "
+        "while the rings rest: a ball that parts, however slowly, counts as undamped, and one that approaches as "
+        "damped all the time. That holds for slower vibrations. In any faster one each ball damps half of the time: "
+        f"the least ratio is then {other:.3g} instead of {least:.3g}."
     )
 
 
@@ -287,6 +357,19 @@ def _modes_table(result: Linearization) -> ReportTable:
         right=heads,
         caption="\n".join((words, *result.notes)),
     )
+
+
+def _faster_table(result: Linearization) -> tuple[ReportTable, ...]:
+    """Frequencies and ratios of vibrations faster than the balls pass, where they are others."""
+    if not result.faster_modes:
+        return ()
+    heads = ("f, Hz", "damped, Hz", "ratio")
+    rows = [
+        (f"{m.natural_frequency:.6g}", f"{m.damped_frequency:.6g}", "" if m.rigid else f"{m.damping_ratio:.4g}")
+        for m in result.faster_modes
+    ]
+    title = f"The same in vibrations faster than {result.passing:.2g} m/s"
+    return (ReportTable(title=title, heads=heads, rows=rows, right=heads),)
 
 
 def _polar(z: complex) -> str:

@@ -140,11 +140,15 @@ def part_of_track(track: Track, first: int, last: int) -> Track:
 
 def depends(model: LoadedModel, output: str, argument: str) -> list[int]:
     """Entries of an argument of the outputs that one of them depends on."""
-    graph = model.symbolic("outputs")
+    known = [info.name for info in model.manifest.outputs]
+    if output in known:
+        graph, place = model.symbolic("outputs"), known.index(output)
+    else:  # what the scene's outputs do not name
+        channels = ChannelValues(model, [output])
+        graph, place = channels._function(channels._all_rows), 0
     if argument not in graph.name_in():
         return []
-    known = [info.name for info in model.manifest.outputs]
-    sparsity = graph.jac_sparsity(known.index(output), graph.name_in().index(argument))
+    sparsity = graph.jac_sparsity(place, graph.name_in().index(argument))
     return list(dict.fromkeys(sparsity.get_col()))
 
 

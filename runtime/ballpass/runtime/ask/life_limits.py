@@ -1,0 +1,68 @@
+"""Limits of rating lives, and of balls without mass, that a bearing is beyond: sentences with number and source.
+
+In: a bearing, its numbers, what a run found of it.  Out: sentences for people.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from ballpass.runtime.ask.life_records import BearingStrength
+from ballpass.runtime.contract import BearingInfo
+
+#: Largest equivalent load over C_r for which ISO 281 gives a life [1].
+LARGEST_LOAD = 0.5
+
+#: Least load over C_r with which balls roll, from makers' catalogues [1].
+LEAST_LOAD = 0.01
+
+#: Peak pressure at which a ball leaves a dent of 1e-4 of its diameter, ISO 76 [Pa].
+STATIC_PRESSURE = 4.2e9
+
+#: Pitch diameter times speed that grease allows, from makers' catalogues [m*rad/s]: 500 000 mm/min.
+SPEED_FACTOR = 500.0 * 2.0 * math.pi / 60.0
+
+#: Density of steel [kg/m^3], and the centrifugal force that may be left out, over the heaviest ball's share of P [1].
+DENSITY, CENTRIFUGAL = 7800.0, 0.1
+
+
+def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStrength) -> Iterator[str]:
+    """What the bearing is beyond."""
+    load, dynamic, static = found.equivalent_load, found.dynamic_rating, found.static_rating
+    if not found.why_no_life and load > LARGEST_LOAD * dynamic:
+        yield (
+            f"P = {load:.4g} N is {load / dynamic:.2f} C_r: ISO 281 gives lives up to {LARGEST_LOAD:g} C_r. "
+            "Real lives are shorter. Take a larger bearing."
+        )
+    if not found.why_no_life and load > static:
+        yield f"P = {load:.4g} N exceeds C_0r = {static:.4g} N: ISO 281 gives no life beyond. Take a larger bearing."
+    if not found.why_no_life and load < LEAST_LOAD * dynamic:
+        yield (
+            f"P = {load:.3g} N is {load / dynamic:.2g} C_r: below {LEAST_LOAD:g} C_r, the minimum load of makers' "
+            "catalogues, balls slide, and wear decides, not fatigue. Preload it, or take a smaller bearing."
+        )
+    pressure = max(found.inner.peak_pressure, found.outer.peak_pressure)
+    if pressure > STATIC_PRESSURE:
+        yield (
+            f"the peak pressure, {pressure / 1e6:.0f} MPa, exceeds {STATIC_PRESSURE / 1e6:.0f} MPa, the static limit "
+            "of ISO 76: balls leave dents, which the model has not."
+        )
+    if found.static_safety < 1.0:
+        yield f"the static safety s_0 = {found.static_safety:.2g} is below 1, the least of ISO 76."
+    ball, pitch = values[f"{info.path}.ball_diameter"], values[f"{info.path}.pitch_diameter"]
+    speed = abs(found.speed)
+    # the outer ring stands: the cage turns at (1 - gamma)/2 of the speed
+    centrifugal = DENSITY * math.pi / 6.0 * ball**3 * 0.5 * pitch * (0.5 * (1.0 - ball / pitch) * speed) ** 2
+    share = 5.0 * load / info.balls
+    if centrifugal > CENTRIFUGAL * share:
+        yield (
+            f"the centrifugal force of a ball, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the heaviest "
+            f"ball's share of P, {share:.3g} N: the model's balls have no mass, which holds to some {CENTRIFUGAL:g}. "
+            "The outer ring carries more than is said here."
+        )
+    if pitch * speed > SPEED_FACTOR:
+        yield (
+            f"n d_m = {pitch * speed * 30.0 / math.pi * 1e3:.3g} mm/min exceeds "
+            f"{SPEED_FACTOR * 30.0 / math.pi * 1e3:.0f} mm/min, the usual limit of makers' catalogues with grease."
+        )
