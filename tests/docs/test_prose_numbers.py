@@ -175,7 +175,7 @@ NAMED: dict[str, dict[str, str]] = {
         "12 % unsafe": "= 100 * 389 / 348 - 100",
         "at 72 places": "reduction_rows.py",
         "41 across it": "ask/wear.py",
-        "as many as 64 steady turns have": "wear.py",
+        "as many as 64 steady turns have": "ask/wear.py",
         "of 76 of the 77 bearings within 2 %": "all but those of MISSED in test_designations.py",
         "2.01 % lower": "the one of MISSED in test_designations.py",
         "Koyo's of 67": "test_designations.py",
