@@ -31,7 +31,7 @@ def press(make_model: Callable[..., Model]) -> Model:
         ("[bearing]\n", f'[loads.work]\ntype = "table"\ntime = {time}\nx = {zeros}\ny = {zeros}\n\n[bearing]\n'),
         ('ball_diameter = "7.9375 mm"', 'ball_diameter = "7.9375 mm"\ndynamic_rating = "13.5 kN"'),
         ("cycles = 4 ", f'duration = "{END} s" '),
-        ('outputs = [', 'outputs = ["cage.in_*", "ring_force.*", '),
+        ("outputs = [", 'outputs = ["cage.in_*", "ring_force.*", '),
         ("transient_cycles = 2", "transient_cycles = 0"),
     )
 
@@ -42,7 +42,11 @@ def numbers(time: np.ndarray, rpm: np.ndarray, x: np.ndarray, y: np.ndarray) -> 
     found |= {f"mechanism.bodies.{body}.mass": 1e-6 for body in ("crank", "rod", "slider")}
     for k in range(ROWS):
         found |= {f"{TABLE}.time.{k + 1}": time[k], f"{TABLE}.speed.{k + 1}": rpm[k] * RPM}
-        found |= {f"loads.work.time.{k + 1}": time[k] + 5e-4, f"loads.work.x.{k + 1}": x[k], f"loads.work.y.{k + 1}": y[k]}
+        found |= {
+            f"loads.work.time.{k + 1}": time[k] + 5e-4,
+            f"loads.work.x.{k + 1}": x[k],
+            f"loads.work.y.{k + 1}": y[k],
+        }
     return found
 
 
@@ -97,7 +101,8 @@ def test_lives_of_random_tables_are_sums_over_passes(press: Model) -> None:
 
 def halves(slow: float, fast: float, half: float) -> dict[str, float]:
     """100 rpm for so many seconds, then 900, with a load along y in each."""
-    time = np.array([0.0, 0.01, half - 1e-3, half + 1e-3, 2.0 * half, 2.0 * half + 1.0])  # the load rises, for what falls on a ring at rest is an impact
+    # the load rises, for what falls on a ring at rest is an impact
+    time = np.array([0.0, 0.01, half - 1e-3, half + 1e-3, 2.0 * half, 2.0 * half + 1.0])
     speed, load = np.array([100.0] * 3 + [900.0] * 3), np.array([0.0, *[slow] * 2, *[fast] * 3])
     return numbers(time, speed, np.zeros(ROWS), load)
 
@@ -106,7 +111,8 @@ def test_damage_counts_turns_and_not_seconds(press: Model) -> None:
     """3 kN where it turns slowly, or fast: 25 798 and 2866 h with a rating of 12 793 N, where seconds say 5117 h."""
     hours = []
     for loads in ((-3000.0, 0.0), (0.0, -3000.0)):
-        (found,) = press.life(cycles=10, transient=0, parameters=halves(*loads, 3.0) | {"bearing.clearance": 0.0}).bearings
+        parameters = halves(*loads, 3.0) | {"bearing.clearance": 0.0}
+        (found,) = press.life(cycles=10, transient=0, parameters=parameters).bearings
         hours.append(found.hours(found.lives["mean"]))
         assert found.speed == pytest.approx(500.0 * RPM, rel=1e-3)
     expected = (13.5 / 12.793) ** 3 * np.array([25798.0, 2866.0])

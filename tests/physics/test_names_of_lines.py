@@ -1,4 +1,4 @@
-"""Claims about the names of lines: healthy machines have no damaged bearings, spalled ones have; frequencies are exact."""
+"""Claims about the names of lines: healthy machines have no damaged bearings, frequencies are exact."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCENES = (
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_healthy_machine_has_no_line_of_a_damaged_bearing(make_model: Callable[..., Model], scene: str) -> None:
-    """At any length of record; BPFO is none: balls of a healthy bearing pass its load, in the rotor the highest line."""
+    """At any length of record; BPFO is none: balls of a healthy bearing pass its load."""
     model = make_model(scene)
     channel = f"{model.manifest.bearings[0].prefix}inner.x"
     for turns in (2, 27, 100, None):

@@ -244,7 +244,7 @@ def _states_start(root: Table) -> Iterator[bool]:
 
 
 def _read_run(table: Table) -> tuple[RunSettings, tuple[str, ...]]:
-    """Length, samples and method of a run, and the names of its outputs; without the table that of the steady machine."""
+    """Length, samples and method of a run, and the names of its outputs; without the table that of the steady one."""
     if table.missing:
         table = Table(table.collector, table.path, dict(STEADY))
     with table:

@@ -19,7 +19,7 @@ from ballpass.runtime.run import driver_angle
 #: most shafts or cages to their sides.  With more of them everything would be something.
 MOST_MULTIPLES, MOST_SIDED, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
 
-#: What a step from a simple name counts, in lines of the spectrum: positions of lines are known to a tenth of these [1].
+#: What a step from a simple name counts, in lines of the spectrum: their positions are known to a tenth [1].
 COMPLICATED = 0.02
 
 #: Other names are given where they are hardly less simple than the first, or than this; and how many at most.

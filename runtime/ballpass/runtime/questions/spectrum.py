@@ -361,7 +361,7 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
         return ()
     return (
         f"The run was sampled at {rate:.6g} Hz, its scene says {finest:.6g} Hz: what lies above {rate / 2.0:.6g} Hz is "
-        "folded below it and stands among the lines. Sample it at the scene's rate, or ask for the spectrum of the scene.",
+        "folded below it and stands among the lines. Sample it at the scene's rate, or ask for the scene's spectrum.",
     )
 
 
