@@ -208,7 +208,7 @@ def run(
                 rtol=solution.statistics.rtol,
                 initial=start,
             )
-            if growth.uncertain:
+            if growth.words:
                 warn(growth.words)
         longer = None
         if turns is not None:

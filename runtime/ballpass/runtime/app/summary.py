@@ -115,7 +115,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     found = _unusual(model, steady)
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
-    grown = [growth.words] if growth is not None and growth.uncertain else []
+    grown = [growth.words] if growth is not None and growth.words else []
     summary["warnings"] = [*unusual(manifest, sol.parameters), *found, *grown]
     return summary
 

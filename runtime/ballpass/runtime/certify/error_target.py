@@ -12,7 +12,8 @@ Chaos: two runs that differ much are no proof, and two that agree by luck are no
 compared but the motion of every state: calm motion forgets what two runs differ in, or carries it on as it is.  Where
 it parts by more, and steps go over kinks, the run is repeated from a start moved by a picometre.  Where that parts as
 well, a tight run and a moved one decide, the same ones at every target.  Motion in which even these two part has no
-value to within any target.  Where they do not, the tight run is one more reference for the estimate.
+value to within any target; how far it is from one is that of `STARTS` moved starts, for two of them may agree by luck.
+Where they do not, the tight run is one more reference for the estimate.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ LEAST = 0.05
 #: Where they step over kinks, so many times that: each loses something else there.
 SUSPECT, SUSPECT_QUANTITY, STEPPED_OVER_NOISE = 1e-4, 1e-3, 3.0
 
-#: How far a start is moved to see whether the motion forgets it [m].
-MOVED = 1e-12
+#: How far a start is moved to see whether the motion forgets it [m], and how many starts say what chaos changes.
+MOVED, STARTS = 1e-12, 8
 
 #: The way that decides on chaos.  Motion that it and its moved run differ in by more than this is chaotic: a picometre,
 #: 1e-8 of a magnitude, has grown ten thousand times [1].
@@ -203,9 +204,10 @@ def _compare(search: _Search, way: MethodChoice, check: MethodChoice) -> tuple[l
         noise = 1.0 if one[0].kinks == LOCATED else STEPPED_OVER_NOISE
         if _apart(search, one, other) <= noise * SUSPECT and max(changes) <= noise * SUSPECT_QUANTITY:
             return estimates, False
-    judge, moved = search(CHAOS_REFERENCE), search(CHAOS_REFERENCE, MOVED)
-    spread = zip(estimates, _relative(loose, judge), _relative(moved, judge), strict=True)
-    return [max(one) for one in spread], _apart(search, (CHAOS_REFERENCE, 0.0), (CHAOS_REFERENCE, MOVED)) > CHAOTIC
+    chaotic = _apart(search, (CHAOS_REFERENCE, 0.0), (CHAOS_REFERENCE, MOVED)) > CHAOTIC
+    starts = [search(CHAOS_REFERENCE, k * MOVED) for k in range(STARTS + 1 if chaotic else 2)]
+    spread = zip(*(_relative(one, start) for start in starts for one in (loose, starts[0])), strict=True)
+    return [max(pair) for pair in zip(estimates, map(max, spread), strict=True)], chaotic
 
 
 def _apart(search: _Search, one: tuple[MethodChoice, float], other: tuple[MethodChoice, float]) -> float:

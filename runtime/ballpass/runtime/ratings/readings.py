@@ -4,9 +4,9 @@ In: mean powers of the loads over the passes.  Out: equivalent loads of both rin
 
 A history has more than one reading.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
 and the other standing, over the passes as well.  `miner` takes the damage of the standing ring at every instant and
-adds it up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the ring's
-own coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft, as a
-punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
+adds it up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the
+ring's own coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft,
+as a punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
 
 Damage counts passes: means are over the angle that the inner ring turns against the outer one, which is time where the
 speeds are constant.
