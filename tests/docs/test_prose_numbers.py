@@ -178,7 +178,7 @@ NAMED: dict[str, dict[str, str]] = {
         "12 % unsafe": "= 100 * 389 / 348 - 100",
         "at 72 places": "reduction_rows.py",
         "41 across it": "ask/wear.py",
-        "up to 64 steady turns": "life_report.py",
+        "as many as 64 steady turns have": "ask/wear.py",
         "of 76 of the 77 bearings within 2 %": "all but those of MISSED in test_designations.py",
         "2.01 % lower": "the one of MISSED in test_designations.py",
         "Koyo's of 67": "test_designations.py",
@@ -207,7 +207,7 @@ NAMED: dict[str, dict[str, str]] = {
         "where 4096 are": "settle.py",
     },
     "docs/reference/outputs.md": {
-        "additional turns: 100, or up to 400": "figure_run.py",
+        "additional turns: 100, or up to 400": "characteristic.py",
         "after 20 that are": "figure_run.py",
         "more than 300 000 steps": "figure_run.py",
     },

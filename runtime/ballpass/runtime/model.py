@@ -117,6 +117,10 @@ class Model(PointModel, Questions):
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
         self._assembled = b""  # parameters whose linkage was looked at last
+        if manifest.run.at_rest and self.has("static_forces"):
+            from ballpass.runtime.point.equilibrium import seated  # with SciPy
+
+            self.manifest = seated(self)
 
     def __reduce__(self) -> tuple[Callable[[str, str, str | None], Model], tuple[str, str, str | None]]:
         return _load_same, (str(self.folder), self.manifest.signature, self._compiler)

@@ -44,6 +44,9 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
+#: The run of a scene without [run]: so many turns are dropped that what is left is the steady machine.
+STEADY = {"cycles": 60, "transient_cycles": 50, "outputs": ["*"]}
+
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
 
@@ -218,7 +221,8 @@ def _read(root: Table, name: str) -> Scene:
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
-        run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
+        run, outputs = _read_run(root.table("run", required=False))
+        seated = "transient_cycles" not in root.data.get("run", {}) and not any(_states_start(root))
         scene = Scene(
             name=name,
             title=title,
@@ -227,13 +231,22 @@ def _read(root: Table, name: str) -> Scene:
             loads=loads,
             bearings=bearings,
             outputs=outputs,
-            run=run,
+            run=replace(run, at_rest=seated),
         )
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
 
+def _states_start(root: Table) -> Iterator[bool]:
+    """Of each bearing: whether the scene says where its rings are at the start."""
+    several = root.data.get("bearings", {})
+    for bearing in (root.data.get("bearing", {}), *(several.values() if isinstance(several, dict) else ())):
+        yield isinstance(bearing, dict) and "initial" in bearing
+
+
 def _read_run(table: Table) -> tuple[RunSettings, tuple[str, ...]]:
-    """Length, samples and method of a run, and the names of its outputs."""
+    """Length, samples and method of a run, and the names of its outputs; without the table that of the steady one."""
+    if table.missing:
+        table = Table(table.collector, table.path, dict(STEADY))
     with table:
         run = read_record(RunSettings, table)
         if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:

@@ -379,7 +379,10 @@ class Load:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSettings:
-    """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s]."""
+    """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s].
+
+    Where the file gives neither a transient nor the rings' initial state, they start `at_rest` under the load of t = 0.
+    """
 
     either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
 
@@ -417,6 +420,7 @@ class RunSettings:
         remedy="write rtol = 1e-6 unless another value is needed",
         note="see {doc}`../theory/integration`",
     )
+    at_rest: bool = False
 
 
 #: Outputs of a run, which `Scene.outputs` holds.

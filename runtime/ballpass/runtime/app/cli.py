@@ -169,7 +169,7 @@ def run(
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
-        from ballpass.runtime.app.summary import add_turns, summarize
+        from ballpass.runtime.app.summary import add_turns, start_words, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.app.summary_words import stands_out
         from ballpass.runtime.report.report import Report
@@ -214,7 +214,7 @@ def run(
                 rtol=solution.statistics.rtol,
                 initial=start,
             )
-            if growth.uncertain:
+            if growth.words:
                 warn(growth.words)
         longer = None
         if turns is not None:
@@ -232,6 +232,8 @@ def run(
                 warn(longer.words)
         else:
             longer = look_further(model, model.numbers(asked.overrides), solution)
+            if longer is not None and longer.first:
+                warn(start_words(longer, solution))
         taken = solution.statistics
         asked_for = (
             model.quantities(

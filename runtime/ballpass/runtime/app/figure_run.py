@@ -6,22 +6,17 @@ one takes too much time.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, cast
 
-from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import turns_to_tell
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.solution import Solution
 
-#: Turns that figures show at least, and that are dropped before them.
-TURNS, SETTLE = 100, 20
-
-#: Lines of the spectrum between ball pass and the nearest harmonic of the shaft, with room for the window's width; most
-#: turns that may cost.
-APART, MOST = 5.0, 400
+#: Turns that are dropped before those of the figures.
+SETTLE = 20
 
 #: Steps that the turns may take: some tenths of a second.  A count, not a time: figures are the same on every machine.
 STEPS = 300_000
@@ -44,13 +39,7 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         return None
     done = (solution.t[-1] - statistics.begin) / length
     numbers = {**solution.parameters, **solution.constants}
-    turns = TURNS
-    for bearing in solution.manifest.bearings:
-        found = frequencies_of(bearing, numbers)
-        order = found.ball_pass_outer / found.shaft if found is not None and found.shaft > 0.0 else 0.0
-        near = abs(order - round(order))
-        if near * MOST > APART:
-            turns = max(turns, math.ceil(APART / near))
+    turns = turns_to_tell(solution.manifest, numbers)
     if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
         return None
     rings = tuple(f"{b.prefix}{ring}." for b in solution.manifest.bearings for ring in ("inner", "outer"))

@@ -83,13 +83,16 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table, with a star where more samples may show more; where it has no digits, with twice its
-    standard deviation over moved starts."""
+    """A number of the table, with a star where more samples may show more.
+
+    Where it has no digits, with twice its standard deviation over moved starts, or how far it is from their mean.
+    """
     if key not in item:
         return ""
     spread = item.get("over_starts", {}).get(key)
     if spread is not None:
-        return f"{factor * item[key]:z.3g} ± {2.0 * factor * spread['std']:.1g}"
+        apart = max(2.0 * spread["std"], abs(item[key] - spread["mean"]))
+        return f"{factor * item[key]:z.3g} ± {factor * apart:.1g}"
     star = "*" if item.get("searched", {}).get(key) == "samples" else ""
     return f"{factor * item[key]:z.4g}{star}"
 
@@ -134,7 +137,7 @@ def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
     )
     law = [f"damping law {laws}"] if laws else []
     if any("over_starts" in item for item in summary.values() if isinstance(item, Mapping)):
-        law.append("± twice the standard deviation over moved starts")
+        law.append("± twice the standard deviation over moved starts, or the distance from their mean")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
     sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []

@@ -36,9 +36,6 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.load_history import LoadHistory, load_history
 from ballpass.runtime.run.request import Request
 
-#: Steady turns whose samples wear and the equivalent load of ISO 281 are taken from, at most.
-SAMPLED_TURNS = 64
-
 
 def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Request) -> LifeReport:
     """Run the scene, in every state of its duty cycle, and judge its bearings.
@@ -73,7 +70,7 @@ def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo,
             name=state.name, share=state.share, bearings=(), turns=None, change=0.0, settled=True, samples=0
         )
     history = load_history(model, numbers, request)
-    samples = load_samples(model, numbers, _sampled(model, history, request))
+    samples = load_samples(history.run, history.turns)
     return StateStrength(
         name=state.name,
         share=state.share,
@@ -87,32 +84,20 @@ def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo,
     )
 
 
-def _sampled(model: LoadedModel, history: LoadHistory, request: Request) -> Request:
-    """The part of a run that is sampled."""
-    turn = driver_angle.period(model.manifest, model.numbers({}).values)
-    if request.duration is not None or not math.isfinite(turn):
-        return request
-    run = model.manifest.run
-    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
-    steady = min(SAMPLED_TURNS, request.cycles - transient if request.cycles is not None else SAMPLED_TURNS)
-    return replace(request, cycles=transient + steady)
-
-
 def _bearing(
     model: LoadedModel, numbers: Numbers, info: BearingInfo, history: LoadHistory, samples: LoadSamples
 ) -> BearingStrength:
     manifest, values = model.manifest, numbers.values
     ratings = ratings_of(info, values)
-    speed = values[info.ring_speed]
     initial = driver_angle.shaft_speed(manifest, values)
-    speed *= history.shaft_speed / initial if initial else 1.0
+    speed = math.copysign(history.speeds[info.prefix], values[info.ring_speed])
     peak = history.peaks[info.prefix]
     force = max(peak.maximum, 0.0)
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
     why = why_no_life(info, values, initial)
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
-    load = float(np.mean(samples.resultant**3)) ** (1.0 / 3.0)
+    load = samples.equivalent_load
     ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
     strength = BearingStrength(

@@ -1,27 +1,29 @@
 """Ball loads at samples of a run, and the wear of both raceways that follows from them.
 
-In: a model, numbers, a request.  Out: `LoadSamples`; fields of wear over the places of a raceway and across its groove.
+In: a run.  Out: `LoadSamples`; fields of wear over the places of a raceway and across its groove.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.ratings.of_bearing import RacewayContact
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.run.loop import Samples, start_run
+from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.segments import time_resolution
 
 Array = NDArray[np.float64]
+
+#: Turns whose samples wear and the equivalent load of ISO 281 have; a longer run has as many, farther apart.
+SAMPLED_TURNS = 64
 
 #: Places across the groove where wear is computed, from its middle to the edge of the widest contact.
 ACROSS = 41
@@ -47,9 +49,20 @@ class LoadSamples:
     in_outer: Array
     in_inner: Array
 
+    @property
+    def equivalent_load(self) -> float:
+        """P of ISO 281, cubic mean over the angle that the rings turn against each other, else over time [N]."""
+        turned = np.abs(_moved(self.in_outer) - _moved(self.in_inner))
+        weight = turned if np.any(turned) else np.ones_like(turned)
+        return float(np.average(self.resultant**3, weights=weight) ** (1.0 / 3.0))
 
-def load_samples(model: LoadedModel, numbers: Numbers, request: Request) -> Mapping[str, LoadSamples]:
+
+def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSamples]:
     """Samples of the steady part of a run, by the prefix of each bearing.
+
+    Parameters
+    ----------
+    turns : of the steady part, where its speed changes; None: as the run has them
 
     Raises
     ------
@@ -58,11 +71,16 @@ def load_samples(model: LoadedModel, numbers: Numbers, request: Request) -> Mapp
     SimulationError
         The computation failed.
     """
-    manifest = model.manifest
-    run = simulate(model, numbers, replace(request, outputs=[]))
-    dropped = run.transient_cycles * run.cycle_length if run.cycle_length is not None else 0.0
-    counted = run.t >= dropped * (1.0 - 1e-12)
-    time, states = run.t[counted], run.x[counted]
+    model, numbers, manifest = run.model, run.numbers, run.model.manifest
+    steady = run.end - run.start
+    turns = steady / run.turn if turns is None else turns
+    # odd: in any whole number of turns two samples differ in the driver's angle, also where a turn has few of them
+    count = 2 * max(int(manifest.run.samples_per_cycle * min(turns or 1.0, SAMPLED_TURNS)) // 2, 2) + 1
+    time = run.start + steady * np.arange(count) / count
+    near = time_resolution(run.begin, run.end, run.turn)
+    samples = Samples(times=time, x=np.empty((count, len(model.states))), near=near, end=run.end)
+    start_run(run, [samples]).go_on()
+    states = samples.x
     names = ("ball.force", "ring_force.x", "ring_force.y", "cage.in_outer", "cage.in_inner")
     channels = ChannelValues(model, [b.prefix + name for b in manifest.bearings for name in names])
     inputs = driver_angle.inputs_over(manifest.inputs, numbers.values, time, time)
@@ -106,7 +124,7 @@ class WearField:
 
 
 def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> WearField:
-    """Wear that the passing balls leave on a raceway, mean over the samples.
+    """Wear that the passing balls leave on a raceway.
 
     Parameters
     ----------
@@ -114,9 +132,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
     """
     force = samples.force
     count, balls = force.shape
-    step = np.diff(angle, append=angle[-1:])
-    moved = np.abs((step + np.pi) % driver_angle.TURN - np.pi)  # angles come back after a turn
-    moved[-1] = moved[-2] if count > 1 else 0.0
+    moved = np.abs(_moved(angle))
     length = float(samples.time[-1] - samples.time[0]) * count / max(count - 1, 1)
     widest = float(contact.semi_axes(float(np.max(force)))[0]) if np.max(force) > 0.0 else 0.0
     across = np.linspace(0.0, widest, ACROSS)
@@ -131,3 +147,12 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
         worn = passed[within] * depth_of_pass(x, load[within], contact)
         rate[:, k] = np.bincount(sector[within], worn, SECTORS)
     return WearField(across=across, rate=rate * SECTORS / (driver_angle.TURN * length))
+
+
+def _moved(angle: Array) -> Array:
+    """How far an angle moves behind each sample, by less than half a turn; behind the last as behind the one before."""
+    moved = np.diff(angle, append=angle[-1:])
+    moved = (moved + np.pi) % driver_angle.TURN - np.pi  # angles come back after a turn
+    if len(moved) > 1:
+        moved[-1] = moved[-2]
+    return np.asarray(moved)

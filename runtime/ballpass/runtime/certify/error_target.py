@@ -12,8 +12,8 @@ Chaos: two runs that differ much are no proof, and two that agree by luck are no
 compared but the motion of every state: calm motion forgets what two runs differ in, or carries it on as it is.  Where
 it parts by more, and steps go over kinks, the run is repeated from a start moved by a picometre.  Where that parts as
 well, a tight run and a moved one decide, the same ones at every target.  Motion in which even these two part is
-chaotic.  Its numbers are known to what they change by with the start: a target above that is met, where starts moved by
-tolerances agree.  Where the two do not part, the tight run is one more reference for the estimate.
+chaotic.  Its numbers are known to what `STARTS` moved starts of the tight run differ in, for two of them may agree by
+luck: a target above that is met.  Where the two do not part, the tight run is one more reference for the estimate.
 """
 
 from __future__ import annotations
@@ -59,15 +59,12 @@ SAFETY = 1.5
 #: with the tolerance as their other errors do, and two runs that step over kinks share it.
 LEAST, LEAST_STEPPED_OVER = 0.05, 0.5
 
-#: Starts of a chaotic motion, moved by a tolerance, two, ...: what their numbers differ in is its error.
-STARTS = 6
-
 #: Runs of a calm motion are less apart where steps end on kinks: in parts of a magnitude, and of a quantity [1].
 #: Where they step over kinks, so many times that: each loses something else there.
 SUSPECT, SUSPECT_QUANTITY, STEPPED_OVER_NOISE = 1e-4, 1e-3, 3.0
 
-#: How far a start is moved to see whether the motion forgets it [m].
-MOVED = 1e-12
+#: How far a start is moved to see whether the motion forgets it [m], and how many starts say what chaos changes.
+MOVED, STARTS = 1e-12, 8
 
 #: The way that decides on chaos.  Motion that it and its moved run differ in by more than this is chaotic: a picometre,
 #: 1e-8 of a magnitude, has grown ten thousand times [1].
@@ -174,11 +171,6 @@ def meet_target(run: Run, target: float, quantities: Sequence[Quantity]) -> Accu
             time=search(way).seconds,
             check_time=search.seconds - search(way).seconds,
         )
-        if chaotic and SAFETY * estimate <= target:
-            estimates = _spread(search, way, estimates)
-            estimate = max(estimates)
-            by_name = dict(zip(names, estimates, strict=True))
-            found = replace(found, estimate=estimate, estimates=by_name, check=f"{check.words}; {STARTS} moved starts")
         if chaotic and SAFETY * estimate > target:
             raise TargetMissed(_chaos(found), found)
         if SAFETY * estimate <= target:
@@ -214,18 +206,10 @@ def _compare(search: _Search, way: MethodChoice, check: MethodChoice) -> tuple[l
         noise = 1.0 if one[0].kinks == LOCATED else STEPPED_OVER_NOISE
         if _apart(search, one, other) <= noise * SUSPECT and max(changes) <= noise * SUSPECT_QUANTITY:
             return estimates, False
-    judge, moved = search(CHAOS_REFERENCE), search(CHAOS_REFERENCE, MOVED)
-    spread = zip(estimates, _relative(loose, judge), _relative(moved, judge), strict=True)
-    return [max(one) for one in spread], _apart(search, (CHAOS_REFERENCE, 0.0), (CHAOS_REFERENCE, MOVED)) > CHAOTIC
-
-
-def _spread(search: _Search, way: MethodChoice, estimates: Sequence[float]) -> list[float]:
-    """Estimates of errors in a chaotic motion, from starts that are moved by tolerances."""
-    moved = way.rtol * search.run.magnitude[: len(search.run.magnitude) // 2]
-    for k in range(1, STARTS + 1):
-        other = way.measure(search.quantities, search.run, k * moved)
-        estimates = [max(pair) for pair in zip(estimates, _relative(search(way), other), strict=True)]
-    return list(estimates)
+    chaotic = _apart(search, (CHAOS_REFERENCE, 0.0), (CHAOS_REFERENCE, MOVED)) > CHAOTIC
+    starts = [search(CHAOS_REFERENCE, k * MOVED) for k in range(STARTS + 1 if chaotic else 2)]
+    spread = zip(*(_relative(one, start) for start in starts for one in (loose, starts[0])), strict=True)
+    return [max(pair) for pair in zip(estimates, map(max, spread), strict=True)], chaotic
 
 
 def _apart(search: _Search, one: tuple[MethodChoice, float], other: tuple[MethodChoice, float]) -> float:

@@ -7,6 +7,9 @@ that forgets its start gives the same numbers within some tolerances.  Where a n
 bear, both are repeated with kinks located, for what a step loses across a kink looks like growth.  Where it still
 changes, the tolerance decides about it, and only statistics mean something.  Nothing is linearised, so laws whose force
 jumps are seen as others are.
+
+Two runs may share an extreme by luck, or have it before errors have grown.  So the states at the end are compared as
+well: where these part, the numbers of more moved starts decide.
 """
 
 from __future__ import annotations
@@ -38,6 +41,9 @@ DIGITS = 5e-4
 #: Changes below so many tolerances are those of steps, not of a perturbation that grows.
 TOLERATED = 100.0
 
+#: States that are apart by so much of their magnitudes at the end, from starts apart by a tolerance, have parted [1].
+PARTED = 1e-3
+
 #: Looser runs are looked at by this tolerance: what their steps lose is their error, not a growth [1].
 LOOSEST = 1e-6
 
@@ -63,12 +69,14 @@ class Growth(ShortRepr):
     moved : how far each position was moved at the start, in its magnitudes [1]
     changes : largest change of minimum, maximum and rms of each channel, relative to the largest of them [1]
     uncertain : channels whose digits the tolerance does not bear
+    parted : how far the states are apart at the end of the run, in their magnitudes [1]
     spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
     """
 
     moved: float
     changes: Mapping[str, float]
     uncertain: tuple[str, ...]
+    parted: float = 0.0
     spread: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -79,6 +87,12 @@ class Growth(ShortRepr):
     @property
     def words(self) -> str:
         """A warning for people; empty where the digits stand."""
+        if not self.uncertain and self.parted > PARTED:
+            return (
+                f"the motion amplifies small errors: from a start moved by {self.moved:g} of the motion the states are "
+                f"{100.0 * self.parted:.2g} % of it apart at the end of the run. Extremes and rms keep their digits, "
+                "samples of the motion do not: another tolerance gives other ones."
+            )
         if not self.uncertain:
             return ""
         worst = max(self.uncertain, key=lambda name: self.changes[name])
@@ -109,10 +123,10 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
     kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
     way = MethodChoice(method="stepper", rtol=rtol, kinks=kinks)
     found = _compare(run, way)
-    if found.uncertain and kinks != LOCATED:
+    if (found.uncertain or found.parted > PARTED) and kinks != LOCATED:
         way = replace(way, kinks=LOCATED)
         found = _compare(run, way)
-    return replace(found, spread=_spread(run, way, found)) if found.uncertain and spread else found
+    return _spread(run, way, found) if (found.uncertain or found.parted > PARTED) and spread else found
 
 
 def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
@@ -140,12 +154,14 @@ def _compare(run: Run, way: MethodChoice) -> Growth:
     quantities = QuantityRun(run.model, quantities_of(run.model, names))
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
 
-    def integrate(start: float | np.ndarray, before: float) -> np.ndarray:
+    def integrate(start: float | np.ndarray, before: float) -> tuple[np.ndarray, np.ndarray]:
         tell = run.progress
         told = replace(run, progress=None if tell is None else lambda done: tell(before + 0.5 * done))
-        return way.measure(quantities, told, start).values.reshape(-1, len(KINDS))
+        found = way.measure(quantities, told, start)
+        assert found.end is not None  # channels are of the motion
+        return found.values.reshape(-1, len(KINDS)), found.end
 
-    one, other = integrate(0.0, 0.0), integrate(moved, 0.5)
+    (one, end), (other, other_end) = integrate(0.0, 0.0), integrate(moved, 0.5)
     tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
     changes, uncertain = {}, []
     for name, mine, its in zip(channels, one, other, strict=True):
@@ -153,12 +169,13 @@ def _compare(run: Run, way: MethodChoice) -> Growth:
         changes[name] = change / largest if largest > 0.0 else 0.0
         if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
             uncertain.append(name)
-    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain))
+    parted = float(np.max(np.abs(other_end - end) / run.magnitude))
+    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted)
 
 
-def _spread(run: Run, way: MethodChoice, found: Growth) -> dict[tuple[str, str], tuple[float, float]]:
-    """Mean and standard deviation of uncertain numbers over starts that are moved by one tolerance, two, ..."""
-    names = [(kind, channel) for channel in found.uncertain for kind in KINDS]
+def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
+    """The same, with which numbers are uncertain and how much by more starts, moved by one tolerance, two, ..."""
+    names = [(kind, channel) for channel in found.changes for kind in KINDS]
     quantities = QuantityRun(run.model, quantities_of(run.model, [f"{kind}:{channel}" for kind, channel in names]))
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
     every = []
@@ -166,8 +183,18 @@ def _spread(run: Run, way: MethodChoice, found: Growth) -> dict[tuple[str, str],
         every.append(way.measure(quantities, replace(run, progress=None), (k + 1) * moved).values)
         if run.progress is not None:
             run.progress((k + 1) / STARTS)
-    mean, deviation = np.mean(every, axis=0).tolist(), np.std(every, axis=0).tolist()
-    return dict(zip(names, zip(mean, deviation, strict=True), strict=True))
+    mean, deviation = np.mean(every, axis=0), np.std(every, axis=0, ddof=1)
+    # twice the deviation is what is printed behind +-
+    channels = list(found.changes)
+    largest = np.max(np.abs(mean).reshape(-1, len(KINDS)), axis=1)
+    apart = 2.0 * np.max(deviation.reshape(-1, len(KINDS)), axis=1)
+    changes = dict(found.changes)
+    for name, size, change in zip(channels, largest.tolist(), apart.tolist(), strict=True):
+        changes[name] = max(changes[name], change / size if size > 0.0 else 0.0)
+    uncertain = tuple(name for name in channels if name in found.uncertain or changes[name] > DIGITS)
+    spread = dict(zip(names, zip(mean.tolist(), deviation.tolist(), strict=True), strict=True))
+    kept = {key: value for key, value in spread.items() if key[1] in uncertain}
+    return replace(found, changes=changes, uncertain=uncertain, spread=kept)
 
 
 def simulate_members(

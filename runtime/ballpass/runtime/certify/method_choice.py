@@ -80,8 +80,12 @@ def default_compared(manifest: Manifest) -> tuple[str, ...]:
 
 
 def motion_of(run: Run, values: EvaluatedQuantities) -> np.ndarray:
-    """Largest and smallest value of each state, over its magnitude, shape (2 * states,)."""
+    """Largest and smallest value of each state, and that at the end, over its magnitude, shape (3 * states,).
+
+    Extremes may be near the start, before errors have grown.
+    """
     layout = reduction_rows(run.model.manifest)
     assert values.row is not None  # `QuantityRun` with `motion`
+    assert values.end is not None
     extremes = [values.row[layout.column(kind, name)] for kind in ("max", "min") for name in run.model.states]
-    return np.asarray(np.array(extremes) / np.tile(run.magnitude, 2))
+    return np.asarray(np.concatenate([extremes, values.end]) / np.tile(run.magnitude, 3))

@@ -163,7 +163,10 @@ class PointInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInfo:
-    """Run settings of the scene file; exactly one of `cycles` and `duration` [s] is given."""
+    """Run settings of the scene file; exactly one of `cycles` and `duration` [s] is given.
+
+    `at_rest`: rings start at rest under the load of t = 0, for the scene says neither where nor what is transient.
+    """
 
     cycles: float | None
     duration: float | None
@@ -171,6 +174,7 @@ class RunInfo:
     samples_per_cycle: int
     method: str
     rtol: float
+    at_rest: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

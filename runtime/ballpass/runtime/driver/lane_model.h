@@ -7,7 +7,7 @@
 
 #include "ensemble_kernels.h"
 #include "model.h"
-#include "powers.h"
+#include "reductions.h"
 
 enum { BP_L = BP_MEMBERS };
 
@@ -156,7 +156,7 @@ BP_INLINE void bp_lane_powers(const double *restrict force, double share, int ro
 }
 
 /* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball, then, where they are wanted,
-   three powers of the loads; and then the third powers of all balls. */
+   three powers of the loads and 1; and then the third powers of all balls. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
                                          const double *restrict t, const double *restrict h, const double *restrict x, int powers,
                                          double *restrict value, double *restrict cubes)
@@ -167,7 +167,7 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
     bp_member_cage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
     double *power = value + 4 * BP_BEARINGS * BP_L;
-    for (int i = 0; i < 3 * BP_BEARINGS * BP_L; i++) power[i] = 0.0;
+    for (int i = 0; i < BP_POWERS * BP_BEARINGS * BP_L; i++) power[i] = i / BP_L % BP_POWERS == 3 ? 1.0 : 0.0;
 #define BP_CHANNEL(b)                                                                                                            \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
@@ -176,12 +176,12 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
         if (powers)                                                                                                              \
-            bp_lane_powers(rows, 1.0 / BP_##b##_BALLS, powers > 1, cubes + (BP_##b##_FIRST_BALL + j) * BP_L, power + 3 * (b) * BP_L); \
+            bp_lane_powers(rows, 1.0 / BP_##b##_BALLS, powers > 1, cubes + (BP_##b##_FIRST_BALL + j) * BP_L, power + BP_POWERS * (b) * BP_L); \
     }
     BP_EACH_BEARING(BP_CHANNEL)
 #undef BP_CHANNEL
     for (int b = 0; b < BP_BEARINGS && powers > 1; b++)
-        BP_EACH_LANE power[(3 * b + 2) * BP_L + lane] = bp_nine_tenths(power[(3 * b + 1) * BP_L + lane]);
+        BP_EACH_LANE power[(BP_POWERS * b + 2) * BP_L + lane] = bp_nine_tenths(power[(BP_POWERS * b + 1) * BP_L + lane]);
 }
 
 #endif

@@ -39,8 +39,9 @@ static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, int
     }
 }
 
-/* Add the steps of lanes to the places of the raceways; see bp_add_sectors. */
-static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
+/* Add the steps of lanes to the powers of loads, whose means over each step are those of the channels, and to the places of the raceways; see
+   bp_add_sectors. */
+static void add_passes(const bp_job *job, bp_lane_block *b, const double *add, const double (*mean)[BP_L])
 {
     double sum[BP_NB + 1][BP_L] BP_ALIGNED, moment[BP_NB + 1][BP_L] BP_ALIGNED;
     for (int j = 0; j < BP_NB; j++) {
@@ -63,12 +64,17 @@ static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
         bp_passes(b->t[lane], x, n.u, n.p, n.c, from);
         get(b->next, lane, x, BP_NX);
         bp_passes(b->t[lane] + b->h[lane], x, n.u, n.p, n.c, to);
+        for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
+            const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
+            b->integral[(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
+        }
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
             const double total = sum[BP_##b_##_FIRST_BALL + j][lane];                                                                   \
             if (total > 0.0)                                                                                                            \
-                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS, b->h[lane] * total,                         \
-                              moment[BP_##b_##_FIRST_BALL + j][lane] / total, from + 2 * (b_), to + 2 * (b_));                          \
+                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS,                                             \
+                              bp_turned(from + 2 * (b_), to + 2 * (b_)) * total, moment[BP_##b_##_FIRST_BALL + j][lane] / total,        \
+                              from + 2 * (b_), to + 2 * (b_));                                                                          \
         }
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
@@ -93,6 +99,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->cubes[q]);
     }
     double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
+    double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};
     for (int k = 0; k < BP_CHANNELS; k++) {
         if (b->wanted[k] == 0.0) continue;
         double *restrict of = news[k];
@@ -106,9 +113,12 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
             const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
             const double squares = k < BP_NX ? bp_mean_square(q) : boole;
+            if (k >= BP_LOOKED_AT) {
+                power[k - BP_LOOKED_AT][lane] = sum;
+                continue;
+            }
             b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
             b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
-            if (k >= BP_LOOKED_AT) continue;
             const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
             of[lane] = add[lane] * (above + 2.0 * below);
             any[lane] += of[lane];
@@ -131,7 +141,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             b->minimum[k * BP_L + lane] = reduction[BP_MIN + k];
         }
     }
-    if (b->powers) add_sectors(job, b, add);
+    if (b->powers) add_passes(job, b, add, (const double(*)[BP_L])power);
     for (int lane = 0; lane < BP_L; lane++)
         if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += b->h[lane];
     for (int k = 0; k < BP_CHANNELS; k++)

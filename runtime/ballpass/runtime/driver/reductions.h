@@ -13,9 +13,11 @@
    an extrapolation across a kink.
 
    What fatigue needs of a bearing's balls follows behind: the mean over them of the third power of their load, of its power 10/3, and the
-   latter to the power 9/10, loads in kN and nothing where they pull.  Only their integrals mean something.  Where they are wanted, the third
-   power is added up over the places of both raceways as well: each raceway's places are hat functions, BP_SECTORS of them, in the ring's own
-   coordinates, and what a ball gives in a step acts at its centroid, so that amount and first moment are right.
+   latter to the power 9/10, loads in kN and nothing where they pull; and one.  Only their integrals mean something.  Fatigue counts passes:
+   these integrals are over the angle that the inner ring turns against the outer one, in either sense, and that of one is this angle.
+   Where they are wanted, the third power is added up over the places of both raceways as well: each raceway's places are hat functions,
+   BP_SECTORS of them, in the ring's own coordinates, and what a ball gives in a step acts at its centroid, so that amount and first moment
+   are right.
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
@@ -33,7 +35,7 @@
 enum {
     BP_POINTS = 5,
     BP_BALL_CHANNELS = 4,
-    BP_POWERS = 3,   /* of the loads of a bearing */
+    BP_POWERS = 4,   /* of the loads of a bearing, the last one is 1 */
     BP_SECTORS = 72, /* of a raceway */
     BP_LOOKED_AT = BP_NX + BP_BALL_CHANNELS * BP_BEARINGS, /* channels with extremes */
     BP_CHANNELS = BP_LOOKED_AT + BP_POWERS * BP_BEARINGS
@@ -51,9 +53,9 @@ enum {
     BP_MIN = BP_MAX_BALL + BP_CHANNELS,
     BP_MIN_TIME = BP_MIN + BP_CHANNELS,
     BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
-    BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time */
+    BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time; of powers over the angle turned [rad] */
     BP_SQUARE = BP_INTEGRAL + BP_CHANNELS,   /* of its square */
-    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the third power over time [kN^3 s]: of each bearing outer, then inner raceway */
+    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the third power likewise [kN^3 rad]: of each bearing outer, then inner raceway */
     BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
 };
 
@@ -82,7 +84,7 @@ static inline int bp_powers_wanted(const double *reduction)
     for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
         const int wanted = reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0;
         powers |= wanted;
-        rooted |= wanted && k % BP_POWERS != 0;
+        rooted |= wanted && k % BP_POWERS > 0 && k % BP_POWERS < 3;
     }
     return powers + rooted;
 }
@@ -128,7 +130,7 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* Means over so many balls of powers of their forces `of` [N]: third, 10/3, and that to the power 9/10; in kN. */
+/* Means over so many balls of powers of their forces `of` [N]: third, 10/3, and that to the power 9/10; in kN.  Behind them 1. */
 static inline void bp_powers(const double *restrict of, int balls, int rooted, double *restrict power)
 {
     double cubes = 0.0, more = 0.0;
@@ -141,6 +143,7 @@ static inline void bp_powers(const double *restrict of, int balls, int rooted, d
     power[0] = cubes / balls;
     power[1] = more / balls;
     power[2] = rooted ? bp_nine_tenths(more / balls) : 0.0;
+    power[3] = 1.0;
 }
 
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
@@ -168,7 +171,7 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
 
    sectors   of the outer, then of the inner raceway
    ball      as a part of a turn behind ball 1
-   amount    integral of the third power over the step [kN^3 s]
+   amount    integral of the third power over the angle turned in the step [kN^3 rad]
    centroid  of it, as a part of the step
    from, to  angle of ball 1 as outer and inner ring see it at both ends of the step [rad] */
 static inline void bp_add_places(double *restrict sectors, double ball, double amount, double centroid, const double *restrict from,
@@ -183,8 +186,11 @@ static inline void bp_add_places(double *restrict sectors, double ball, double a
     }
 }
 
-/* The same for all balls of a bearing, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart. */
-static inline void bp_add_sectors(double *restrict sectors, int balls, double h, const double *restrict of, const double *restrict from,
+/* Angle that the inner ring turns against the outer one in a step, in either sense [rad]; arguments as above. */
+static inline double bp_turned(const double *restrict from, const double *restrict to) { return fabs(to[0] - from[0] - (to[1] - from[1])); }
+
+/* Add what all balls of a bearing give, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart. */
+static inline void bp_add_sectors(double *restrict sectors, int balls, double turned, const double *restrict of, const double *restrict from,
                                   const double *restrict to)
 {
     for (int j = 0; j < balls; j++) {
@@ -194,7 +200,7 @@ static inline void bp_add_sectors(double *restrict sectors, int balls, double h,
             sum += bp_boole[i] * (load * load * load);
             moment += 0.25 * i * bp_boole[i] * (load * load * load);
         }
-        if (sum > 0.0) bp_add_places(sectors, (double)j / balls, h * sum, moment / sum, from, to);
+        if (sum > 0.0) bp_add_places(sectors, (double)j / balls, turned * sum, moment / sum, from, to);
     }
 }
 
@@ -564,11 +570,10 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         const double exact = bp_mean_square(q);
         square[k] = k < BP_NX ? exact : boole;
     }
-    for (int k = 0; k < BP_CHANNELS; k++) {
+    for (int k = 0; k < BP_LOOKED_AT; k++) {
         if (reduction[BP_WANTED + k] == 0.0) continue;
         reduction[BP_INTEGRAL + k] += h * sum[k];
         reduction[BP_SQUARE + k] += h * square[k];
-        if (k >= BP_LOOKED_AT) continue;
         if (first || top[k] > reduction[BP_MAX + k])
             bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, step);
         if (first || bottom[k] < reduction[BP_MIN + k])
@@ -581,9 +586,13 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
             const double t = step->state(step->source, end, x);
             bp_passes(t, x, step->n->u, step->n->p, step->n->c, end ? to : from);
         }
+        for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
+            const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
+            if (reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0) reduction[BP_INTEGRAL + BP_LOOKED_AT + k] += turned * sum[BP_LOOKED_AT + k];
+        }
 #define BP_ADD(b)                                                                                                                       \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, h, of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,       \
-                   from + 2 * (b), to + 2 * (b));
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, bp_turned(from + 2 * (b), to + 2 * (b)),              \
+                   of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
     }

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -276,6 +277,27 @@ def start_at_rest(model: LoadedModel, numbers: Numbers) -> Array:
             "two balls carry, or a state: initial = model.static_equilibrium().x takes one of the many."
         )
     return found.x
+
+
+def seated(model: LoadedModel) -> Manifest:
+    """The manifest whose rings start at rest under the load of t = 0; concentric ones where nothing holds them there.
+
+    They stay there when other parameters change, so that runs of neighbours start alike.
+    """
+    manifest = model.manifest
+    try:
+        found = _equilibrium(model, model.numbers(), 0.0, None)
+    except (RequestError, SimulationError):
+        return manifest
+    at = dict(zip(manifest.initial, found.x.tolist(), strict=True))
+    path = tuple(f"{bearing.path}." for bearing in manifest.bearings)
+    return replace(
+        manifest,
+        parameters=tuple(
+            replace(info, default=at[info.name]) if info.name.startswith(path) and info.name in at else info
+            for info in manifest.parameters
+        ),
+    )
 
 
 def _mostly(found: StaticEquilibrium) -> str:

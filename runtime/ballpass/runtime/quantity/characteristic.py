@@ -7,6 +7,7 @@ They come from the speed of the model's cage, so that slip of the cage shifts th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,11 +15,22 @@ from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.run import driver_angle
 
-#: Multiples that are looked for: of the shaft, of ball passes, of the cage (more are ball passes); and the most shafts
-#: or cages to their sides.  With more of them everything would be something.
-MOST_OF_SHAFT, MOST_MULTIPLES, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
-#: A second name is told where it is hardly less simple.
-NEARLY_AS_SIMPLE = 2
+#: Multiples that are looked for: of ball passes, of these with sidebands, of the cage (more are ball passes); and the
+#: most shafts or cages to their sides.  With more of them everything would be something.
+MOST_MULTIPLES, MOST_SIDED, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
+
+#: What a step from a simple name counts, in lines of the spectrum: their positions are known to a tenth [1].
+COMPLICATED = 0.02
+
+#: Other names are given where they are hardly less simple than the first, or than this; and how many at most.
+NEARLY_AS_SIMPLE, SIMPLE, MOST_NEAR = 2, 8, 2
+
+#: Turns of a spectrum at least; its lines between ball pass and the nearest harmonic of the shaft, with room for the
+#: window's width; and the most turns that these may cost.
+TURNS, APART, MOST = 100, 5.0, 400
+
+#: Channels of a linkage begin with these.
+LINKAGE = ("reaction.", "drive_", "driver.", "body.", "point.", "spring.", "stop.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,26 +117,88 @@ def characteristic_lines(
     return tuple(found)
 
 
-def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> str:
-    """What a line of a spectrum is: "3 BPFO", "BPFI - shaft"; the simplest that fits, "" where nothing does.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineName:
+    """What a line of a spectrum may be.
+
+    Attributes
+    ----------
+    words : "3 BPFO", "BPFI - shaft"
+    frequency : of that, in the unit of the lines
+    rank : how far from simple the words are
+    beside : distance from the line of the spectrum, in lines of the spectrum [1]
+    of_shaft : whether it is the shaft alone
+    """
+
+    words: str
+    frequency: float
+    rank: int
+    beside: float
+    of_shaft: bool
+
+
+def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> tuple[LineName, ...]:
+    """What a line of a spectrum is, then as simple names that the record cannot tell from it; empty for nothing.
+
+    The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
+    name of a bearing from a multiple of the shaft, the shaft wins.
 
     Parameters
     ----------
     frequency : of the line
     resolution : distance of two lines of the spectrum: largest distance of a name from the line
     """
-    fits: list[tuple[int, float, str]] = []
+    fits: list[LineName] = []
     for line in lines:
         if line.frequency == 0.0:
             continue
-        most = {"shaft": MOST_OF_SHAFT, "FTF": MOST_OF_CAGE}.get(line.name, MOST_MULTIPLES)
+        of_shaft = line.name == "shaft"
         for m in range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1) if line.side else (0,):
+            most = MOST_OF_CAGE if line.name == "FTF" else MOST_SIDED if m else MOST_MULTIPLES
             k = round((frequency - m * line.side) / line.frequency)
-            beside = abs(frequency - k * line.frequency - m * line.side)
-            if 1 <= k <= most and beside <= resolution * (1.0 + 1e-9):
-                fits.append((k + 3 * abs(m), beside, _words(k, m, line)))
-    fits.sort()
-    return " or ".join(words for rank, _, words in fits[:2] if rank <= fits[0][0] + NEARLY_AS_SIMPLE)
+            found = k * line.frequency + m * line.side
+            beside = abs(frequency - found) / resolution
+            if (1 <= k <= most or (of_shaft and k >= 1)) and beside <= 1.0 + 1e-9:
+                words, rank = _words(k, m, line), k + 3 * abs(m)
+                fits.append(LineName(words=words, frequency=found, rank=rank, beside=beside, of_shaft=of_shaft))
+    if not fits:
+        return ()
+    fits.sort(key=lambda name: (not name.of_shaft, name.beside + COMPLICATED * name.rank, name.words))
+    first, *others = fits
+    simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
+    near = [name for name in others if not name.of_shaft and name.rank <= simple]
+    return (first, *near[:MOST_NEAR])
+
+
+def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> str:
+    """What a line of a spectrum is: "3 BPFO", "BPFI - shaft", "" where nothing fits; arguments as of `names_of`."""
+    return next((name.words for name in names_of(frequency, lines, resolution)), "")
+
+
+def turns_to_tell(manifest: Manifest, values: Mapping[str, float]) -> int:
+    """Turns of a spectrum that tells ball pass from the nearest multiple of the shaft; `TURNS` at least.
+
+    Parameters
+    ----------
+    values : parameters and derived constants by name
+    """
+    turns = TURNS
+    for bearing in manifest.bearings:
+        found = frequencies_of(bearing, values)
+        order = found.ball_pass_outer / found.shaft if found.shaft > 0.0 else 0.0
+        near = abs(order - round(order))
+        if near * MOST > APART:
+            turns = max(turns, math.ceil(APART / near))
+    return turns
+
+
+def carries_lines(manifest: Manifest, channel: str) -> bool:
+    """Whether bearings are heard in a channel: not in what an ideal linkage does, nor in a load that is given."""
+    parameters = {info.name for info in manifest.parameters}
+    # a bearing that takes a share of the reaction is coupled one-way
+    ideal = all(f"{bearing.path}.share" in parameters for bearing in manifest.bearings)
+    loads = tuple(f"{bearing.prefix}load." for bearing in manifest.bearings)
+    return not (channel.startswith(loads) or (manifest.mechanism is not None and ideal and channel.startswith(LINKAGE)))
 
 
 def _words(k: int, m: int, line: CharacteristicLine) -> str:

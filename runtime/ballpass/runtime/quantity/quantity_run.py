@@ -67,6 +67,7 @@ class EvaluatedQuantities:
     estimates : one for each quantity
     track : states along nodes of the whole run; None where there are none
     row : reductions, None where nothing was run
+    end : state at the end of the run, shape (states,); None likewise
     seconds : of the plain integration alone [s]
     steps, rejected : of the integration
     """
@@ -74,6 +75,7 @@ class EvaluatedQuantities:
     estimates: tuple[Estimate, ...]
     track: Track | None = None
     row: Array | None = None
+    end: Array | None = None
     seconds: float = 0.0
     steps: int = 0
     rejected: int = 0
@@ -234,6 +236,7 @@ class QuantityRun:
             estimates=estimates,
             track=track,
             row=row if len(row) else None,
+            end=state if self._runs else None,
             seconds=seconds,
             steps=steps,
             rejected=rejected,

@@ -103,9 +103,11 @@ def _pressure(
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of
     from ballpass.runtime.run.request import Request
+    from ballpass.runtime.run.resolve import resolve
 
     numbers = model.numbers(overrides)
-    samples = load_samples(model, numbers, Request(cycles=model.manifest.run.transient_cycles + 1.0))[info.prefix]
+    run = resolve(model, numbers, Request(cycles=model.manifest.run.transient_cycles + 1.0))
+    samples = load_samples(run)[info.prefix]
     inner, outer = contacts_of(info, numbers.values)
     ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
     crank = np.unwrap(samples.crank)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
+from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate, Transient
+from ballpass.runtime.contract.options import Duration, Option, Rtol, Transient
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -21,12 +23,30 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.vibration import DiagnosisStatistics
-    from ballpass.runtime.quantity.characteristic import CharacteristicLine
+    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.quantity.characteristic import CharacteristicLine, LineName
     from ballpass.runtime.run.solution import Solution
 
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
+Cycles = Annotated[
+    float | None,
+    Option(
+        words="Turns of driver or shaft to simulate; as many as tell ball pass from the shaft if not given.",
+        shown="N",
+        above=0.0,
+    ),
+]
+SampleRate = Annotated[
+    float | None,
+    Option(
+        words="Lines up to half of this; the run is sampled as finely as the scene says at least.",
+        example='"25.6 kHz"',
+        shown="RATE",
+        unit="Hz",
+    ),
+]
 Of = Annotated[str, Option(words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT")]
 Band = Annotated[
     tuple[float, float] | None,
@@ -70,6 +90,7 @@ class SignalSpectrum(ShortRepr, Reported):
     marks : characteristic frequencies or orders
     statistics : of the signal
     solution : its steady part
+    warnings : what to mind
 
     Examples
     --------
@@ -93,13 +114,36 @@ class SignalSpectrum(ShortRepr, Reported):
     marks: tuple[CharacteristicLine, ...]
     statistics: DiagnosisStatistics
     solution: Solution
+    warnings: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         """What the highest lines are: "BPFO", "2 shaft"; empty for what is none."""
-        from ballpass.runtime.quantity.characteristic import identify
+        return tuple(found[0].words if found else "" for found in self._found)
 
-        return tuple(identify(float(self.position[k]), self.marks, self.resolution) for k in self.highest)
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """Other names that this record cannot tell from these, with the turns that would: "2 BSF (61 turns)"."""
+        turn = next((mark.frequency for mark in self.marks if mark.name == "shaft"), 1.0)
+
+        def words(first: LineName, other: LineName) -> str:
+            apart = abs(first.frequency - other.frequency)
+            length = f"{math.ceil(turn / apart)} turns" if apart > 1e-9 * turn else "the same frequency"
+            return f"{other.words} ({length})"
+
+        return tuple(", ".join(words(found[0], other) for other in found[1:]) for found in self._found)
+
+    @property
+    def _found(self) -> list[tuple[LineName, ...]]:
+        from ballpass.runtime.quantity.characteristic import names_of
+
+        return [names_of(self._top(k), self.marks, self.resolution) for k in self.highest]
+
+    def _top(self, k: int) -> float:
+        """Position of a local maximum: that of the parabola through the logarithms of three lines."""
+        low, high, behind = np.log(np.maximum(self.height[k - 1 : k + 2], 1e-300 + 1e-9 * self.height[k]))
+        bend = low - 2.0 * high + behind
+        return float(self.position[k] + (self.resolution * 0.5 * (low - behind) / bend if bend < 0.0 else 0.0))
 
     def _report(self) -> Report:
         rows = [
@@ -107,16 +151,18 @@ class SignalSpectrum(ShortRepr, Reported):
                 "order" if self.orders else "frequency": float(self.position[k]),
                 self.scaling: float(self.height[k]),
                 "line": name,
+                "alternatives": others,
             }
-            for k, name in zip(self.highest, self.names, strict=True)
+            for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
         ]
         across = "order" if self.orders else "frequency [Hz]"
+        columns = 4 if any(self.alternatives) else 3
         table = ReportTable(
             title=f"Highest lines of {self.of}",
-            heads=(across, self.height_unit, "line"),
+            heads=(across, self.height_unit, "line", "or (told apart by)")[:columns],
             rows=[
-                (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name)
-                for k, name in zip(self.highest, self.names, strict=True)
+                (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name, others)[:columns]
+                for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
             ],
             right=(across, self.height_unit),
         )
@@ -139,7 +185,7 @@ class SignalSpectrum(ShortRepr, Reported):
             "lines": rows,
             "figure": None,  # the command puts the file here
         }
-        return Report(parts=(table, *said), facts=facts, records=rows)
+        return Report(parts=(table, *said), facts=facts, records=rows, warnings=self.warnings)
 
 
 def _check(values: Mapping[str, Any]) -> None:
@@ -229,7 +275,7 @@ def spectrum(
     from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
     from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
     from ballpass.runtime.ask.vibration import envelope as envelope_of
-    from ballpass.runtime.quantity.characteristic import characteristic_lines
+    from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines
     from ballpass.runtime.run.solution import Solution
 
     if isinstance(model, Solution):
@@ -239,15 +285,17 @@ def spectrum(
                 "--orders, --spectrogram, --window, --scaling, --top, --transient."
             )
         run = model if transient is None else replace(model, transient_cycles=transient)
+        warnings = _too_slow(run)
     else:
-        states = [info.name for info in model.manifest.states]
+        states, warnings = [info.name for info in model.manifest.states], ()
+        finest = _scene_rate(model.manifest, model.numbers(parameters).values)
         run = model.simulate(
-            cycles=cycles,
+            cycles=_turns(model, parameters, transient) if cycles is None and duration is None else cycles,
             duration=duration,
             transient=transient,
             parameters=parameters,
             rtol=rtol,
-            sample_rate=sample_rate,
+            sample_rate=None if sample_rate is None else sample_rate * max(1, math.ceil(finest / sample_rate)),
             outputs=[] if of in states and of not in model.outputs else [of],
             progress=progress,
         )
@@ -256,20 +304,27 @@ def spectrum(
     if signal.ndim != 1:
         raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
     values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
+    time, even = solution.t[:-1], values[:-1]  # the end of a whole number of turns is their start again
     unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
     if orders or scaling == "amplitude":
         if orders:
             lines = order_spectrum(_angle(solution), values, window=window)
         else:
-            lines = amplitude_spectrum(solution.t, values, window=window)
+            lines = amplitude_spectrum(time, even, window=window)
         position, height, resolution = lines.frequency, lines.amplitude, lines.resolution
         height_unit = unit
     else:
         kind: Literal["spectrum", "density"] = "spectrum" if scaling == "power" else "density"
-        power = power_spectrum(solution.t, values, window=window, scaling=kind)
+        power = power_spectrum(time, even, window=window, scaling=kind)
         position, height, resolution = power.frequency, power.power, power.resolution
         height_unit = f"({unit})^2" + ("/Hz" if scaling == "density" else "")
+    if sample_rate is not None and not orders:
+        within = position <= 0.5 * sample_rate * (1.0 + 1e-9)
+        position, height = position[within], height[within]
     numbers = {**solution.parameters, **solution.constants}
+    marks = characteristic_lines(solution.manifest, numbers, orders=orders)
+    if not carries_lines(solution.manifest, of):
+        marks = tuple(mark for mark in marks if mark.name == "shaft")
     changing = run.period is None and run.cycle_length is not None
     return SignalSpectrum(
         of=of,
@@ -284,10 +339,45 @@ def spectrum(
         height_unit=height_unit,
         resolution=resolution,
         highest=_peaks(height, top),
-        marks=() if changing and not orders else characteristic_lines(solution.manifest, numbers, orders=orders),
+        marks=() if changing and not orders else marks,
         statistics=diagnosis(signal),
         solution=solution,
+        warnings=warnings,
     )
+
+
+def _scene_rate(manifest: Manifest, values: Mapping[str, float]) -> float:
+    """Samples a second that the scene says [Hz]; 0 where nothing turns."""
+    from ballpass.runtime.run.driver_angle import TURN, shaft_speed
+
+    return manifest.run.samples_per_cycle * abs(shaft_speed(manifest, values)) / TURN
+
+
+def _too_slow(run: Solution) -> tuple[str, ...]:
+    """A warning where a run that is done was sampled more slowly than its scene says."""
+    rate = (len(run.t) - 1) / (run.t[-1] - run.t[0]) if len(run.t) > 1 else math.inf
+    finest = _scene_rate(run.manifest, {**run.parameters, **run.constants})
+    if rate >= finest * (1.0 - 1e-6):
+        return ()
+    return (
+        f"The run was sampled at {rate:.6g} Hz, its scene says {finest:.6g} Hz: what lies above {rate / 2.0:.6g} Hz is "
+        "folded below it and stands among the lines. Sample it at the scene's rate, or ask for the scene's spectrum.",
+    )
+
+
+def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
+    """Turns of a run that tells ball pass from the shaft; None where a table gives the speed or nothing turns."""
+    from ballpass.runtime.quantity.characteristic import turns_to_tell
+    from ballpass.runtime.run.driver_angle import period
+
+    manifest, values = model.manifest, model.numbers(parameters).values
+    turn = period(manifest, values)
+    if not math.isfinite(turn) or any(item.name == DRIVER_ACCELERATION for item in manifest.inputs):
+        return None
+    settings = manifest.run
+    stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
+    dropped = settings.transient_cycles if transient is None else transient
+    return max(stated, dropped + turns_to_tell(manifest, values))
 
 
 def _angle(solution: Solution) -> np.ndarray:

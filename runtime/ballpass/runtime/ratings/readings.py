@@ -1,14 +1,15 @@
 """Ways to get a rating life from a history of ball loads: mean over time, Miner's rule, sectors of the raceways.
 
-In: mean powers of the loads over time.  Out: equivalent loads of both rings [N], lives [turns].
+In: mean powers of the loads over the passes.  Out: equivalent loads of both rings [N], lives [turns].
 
 A history has more than one reading.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
-and the other standing, over time as well.  `miner` takes the damage of the standing ring at every instant and adds it
-up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the ring's own
-coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft, as a
-punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
+and the other standing, over the passes as well.  `miner` takes the damage of the standing ring at every instant and
+adds it up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the
+ring's own coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft,
+as a punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
 
-Means are over time, which is over turns where the speed is constant.
+Damage counts passes: means are over the angle that the inner ring turns against the outer one, which is time where the
+speeds are constant.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ KILO = 1e3
 
 #: Readings, and their descriptions.
 READINGS = {
-    "mean": "ISO 16281, inner ring turning against the load, outer ring standing, means over time",
+    "mean": "ISO 16281, inner ring turning against the load, outer ring standing, means over the passes",
     "miner": "the same, the damage of the outer ring added up instant by instant",
     "sectors": "damage of every place of both raceways, the ring as it turns",
 }
@@ -37,7 +38,7 @@ KINDS = {"life": tuple(READINGS), **{f"life_{reading}": (reading,) for reading i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadPowers:
-    """Means over time, loads in kN; each of shape (members,) or a number, `raceways` with two axes more.
+    """Means over the passes, loads in kN; each of shape (members,) or a number, `raceways` with two axes more.
 
     Attributes
     ----------

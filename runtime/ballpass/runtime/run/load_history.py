@@ -24,7 +24,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
 
 #: Relative change of a life that counts as zero [1].
@@ -37,18 +37,22 @@ class LoadHistory:
 
     Attributes
     ----------
-    turns : how long that was; None where nothing turns
-    duration : [s]
+    run : the run, as long as it was
+    turns : how long its steady part was; None where nothing turns
+    duration : of that [s]
     shaft_speed : mean of driver or shaft [rad/s]
+    speeds : mean speed of the inner ring of each bearing against the outer one, by its prefix [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
     settled : whether that counts as none
-    powers : of the loads of each bearing, by its prefix
+    powers : of the loads of each bearing, likewise
     peaks : the highest force of any ball of each bearing, likewise
     """
 
+    run: Run
     turns: float | None
     duration: float
     shaft_speed: float
+    speeds: Mapping[str, float]
     change: float
     settled: bool
     powers: Mapping[str, LoadPowers]
@@ -109,7 +113,7 @@ def _history(going: ReducedRun) -> LoadHistory:
     speed = driver_angle.shaft_speed(manifest, going.run.numbers.values)
     if manifest.mechanism is not None and manifest.mechanism.rate:
         speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
-    powers, peaks = {}, {}
+    powers, peaks, speeds = {}, {}, {}
     for bearing in manifest.bearings:
         found = load_powers(manifest, bearing, going.row[None, :])
         powers[bearing.prefix] = LoadPowers(
@@ -119,10 +123,14 @@ def _history(going: ReducedRun) -> LoadHistory:
             raceways=found.raceways[0],
         )
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
+        turned = going.row[layout.column("integral", bearing.prefix + LOAD_POWERS[-1])]
+        speeds[bearing.prefix] = float(turned) / duration
     return LoadHistory(
+        run=replace(going.run, end=going.run.start + duration),
         turns=duration * abs(speed) / driver_angle.TURN if speed else None,
         duration=duration,
         shaft_speed=speed,
+        speeds=speeds,
         change=math.inf,
         settled=False,
         powers=powers,

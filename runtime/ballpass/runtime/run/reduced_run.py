@@ -58,6 +58,13 @@ class ReducedRun:
         """What runs."""
         return self.going.run
 
+    def take(self) -> Reductions:
+        """Those since the last time that they were taken."""
+        found = self.reductions()
+        layout = reduction_rows(self.run.model.manifest)
+        self.row[:] = layout.empty(1, self.going.time, self.channels)[0]
+        return found
+
     def reductions(self) -> Reductions:
         """Those so far."""
         going = self.going

@@ -230,10 +230,10 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
 
 
 def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> LoadPowers:
-    """Mean powers of a bearing's ball loads from reductions, shape (members, .)."""
+    """Mean powers of a bearing's ball loads over its passes from reductions, shape (members, .)."""
     layout = reduction_rows(manifest)
-    duration = rows[:, HEAD.index("duration")]
-    cubes, more, damage = (rows[:, layout.column("integral", bearing.prefix + name)] / duration for name in LOAD_POWERS)
-    length = duration[:, None, None] * bearing.balls / SECTORS
-    places = layout.raceways(rows, bearing.prefix) / length
+    every = [rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS]
+    turned = np.where(every[-1] > 0.0, every[-1], np.inf)  # no pass, no damage
+    cubes, more, damage = (power / turned for power in every[:-1])
+    places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
     return LoadPowers(cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=places)

@@ -4,12 +4,15 @@ In: a model, numbers, a request.  Out: `Settled`.  The balls meet the load's pea
 of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel by
 more than `PEAKS` of its range, and no rms by more than `MEANS`.  Fewer than `LEAST` turns are not trusted: two and four
 of them may share a peak by luck.
+
+What later turns do not come near is of the start, as the impact of a ring that falls through its clearance: where the
+second half of the turns misses an extreme of the first by more than `START` of the range, the first half is transient.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,8 +21,8 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.reduced_run import reduce_run, start_reducing
-from ballpass.runtime.run.reductions import Reductions, channel_names
+from ballpass.runtime.run.reduced_run import start_reducing
+from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.solution import Solution
@@ -29,6 +32,9 @@ from ballpass.runtime.show.short import ShortRepr
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
 PEAKS, MEANS = 5e-3, 1e-2
+
+#: Part of its range by which an extreme of a channel is above all of later turns where it is one of the start [1].
+START = 5e-2
 
 #: Steady turns that are compared with twice as many at first, and the most that are run.
 LEAST, MOST = 64, 4096
@@ -45,6 +51,8 @@ class Settled(ShortRepr):
     ----------
     reductions : over all steady turns
     turns : how many they are
+    dropped : turns before them that were transient as well
+    first : of each channel whose extreme is one of the start: "max" or "min", its time [s], it, and that of later turns
     settled : whether half of them gave the same; False where the most turns were not enough
     changes : of each channel by the second half of the turns: of the extremes, over the range, and of the rms [1]
     """
@@ -53,6 +61,8 @@ class Settled(ShortRepr):
     turns: int
     settled: bool
     changes: Mapping[str, tuple[float, float]]
+    dropped: int = 0
+    first: Mapping[str, tuple[str, float, float, float]] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         state = "Settled" if self.settled else "Not settled"
@@ -64,9 +74,10 @@ class Settled(ShortRepr):
         name = max(self.changes, key=lambda channel: max(self.changes[channel]))
         peak, mean = self.changes[name]
         state = "settled" if self.settled else "not settled"
+        behind = f" behind {self.dropped} of transient" if self.dropped else ""
         return (
-            f"peaks and rms {state} over {self.turns} steady turns: the second half changed extremes and rms most in "
-            f"{name}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
+            f"peaks and rms {state} over {self.turns} steady turns{behind}: the second half changed extremes and rms "
+            f"most in {name}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
         )
 
 
@@ -95,18 +106,24 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
-    going = start_reducing(run, channel_names(model.manifest))
+    going, counter = start_reducing(run, channel_names(model.manifest)), _counter(model)
     going.go_on()
-    before = going.reductions()
+    before, lost = going.take(), 0
     while True:
         turns *= 2
         going.go_on(run.begin + (dropped + turns) * turn)
-        found = going.reductions()
-        changes = changed(before, found, _counter(model))
-        settled = _settled(changes)
+        later = going.take()
+        found = joined(before, later)
+        assert found is not None
+        changes = changed(before, found, counter)
+        of_start = bool(extremes_of_start(before, later, counter))
+        settled = _settled(changes) and not of_start
         if settled or 2 * turns > most:
-            return Settled(reductions=found, turns=turns, settled=settled, changes=changes)
-        before = found
+            return Settled(reductions=found, turns=turns - lost, settled=settled, changes=changes, dropped=lost)
+        if of_start:
+            before, lost = later, turns // 2
+        else:
+            before = found
 
 
 def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
@@ -142,9 +159,17 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
             parameters=solution.parameters,
         ),
     )
-    found = reduce_run(model, numbers, request)
-    changes = changed(few, found, _counter(model))
-    return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes)
+    run, counter = resolve(model, numbers, request), _counter(model)
+    going = start_reducing(run, channel_names(model.manifest))
+    going.go_on((run.start + run.end) / 2.0)
+    early = going.take()
+    going.go_on()
+    later = going.take()
+    found = joined(early, later)
+    assert found is not None
+    changes = changed(few, found, counter)
+    first = extremes_of_start(few, later, counter)
+    return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
 
 
 def _dropped(transient: float, begin: float, turn: float) -> float:
@@ -171,4 +196,18 @@ def changed(few: Reductions, many: Reductions, counter: str = "") -> dict[str, t
         more, span = many[name], many[name].range
         peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
         found[name] = (peak / span if span > 0.0 else 0.0, abs(less.rms / more.rms - 1.0) if more.rms > 0.0 else 0.0)
+    return found
+
+
+def extremes_of_start(
+    few: Reductions, later: Reductions, counter: str = ""
+) -> dict[str, tuple[str, float, float, float]]:
+    """Extremes that later turns do not come near, as `Settled.first`; not of the `counter`."""
+    found = {}
+    for name, first in few.items():
+        behind = later[name]
+        up, down = first.maximum - behind.maximum, behind.minimum - first.minimum
+        if name != counter and max(up, down) > START * max(behind.range, max(up, down)):
+            most = ("max", first.maximum_time, first.maximum, behind.maximum)
+            found[name] = most if up >= down else ("min", first.minimum_time, first.minimum, behind.minimum)
     return found

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import LOAD_POWERS, SECTORS
+from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
@@ -28,6 +29,10 @@ Dual = tuple[float | Array, Array]
 
 #: Angle of ball 1 as the rings see it, outer and inner, behind the bearing's prefix.
 PLACES = ("cage.in_outer", "cage.in_inner")
+
+#: Rate at Gauss's nodes of what has values there, over the part of a panel: that of the polynomial through them.
+_POWERS = np.vander(GAUSS, increasing=True)
+RATE = np.arange(len(GAUSS)) * np.pad(_POWERS, ((0, 0), (1, 0)))[:, :-1] @ np.linalg.inv(_POWERS)
 
 #: Step along the imaginary axis that gives the derivatives of powers of means: no difference is taken, so that none
 #: cancels, however small it is (Squire and Trapp 1998) [1].
@@ -45,7 +50,7 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     _check(view.manifest, view.numbers.values, quantity)
     bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
     ratings, moved_ratings = _ratings(view, bearing)
-    powers, moved_powers = _powers(view, quantity, prefix, raceways="sectors" in readings)
+    powers, moved_powers = _powers(_over_passes(view, prefix), quantity, prefix, raceways="sectors" in readings)
     found = lives(ratings, powers)
     shortest = min(readings, key=lambda reading: found[reading])
     notes = (f"of {shortest}",) if len(readings) > 1 else ()
@@ -84,8 +89,20 @@ def _ratings(view: View, bearing: BearingInfo) -> tuple[Ratings, Ratings]:
     return found, moved
 
 
+def _over_passes(view: View, prefix: str) -> View:
+    """The same with integrals over the angle that the inner ring turns against the outer one, in either sense."""
+    nodes = view.nodes
+    within = np.flatnonzero(nodes.weight).reshape(-1, len(GAUSS))
+    outer, inner = (view.signals[prefix + place] for place in PLACES)
+    turned = WEIGHTS * ((outer.value - inner.value)[within, 0] @ RATE.T)
+    moved = np.einsum("i,ij,pjd->pid", WEIGHTS, RATE, (outer.slope - inner.slope)[within, 0])
+    weight, weight_slope = np.zeros_like(nodes.weight), np.zeros_like(nodes.weight_slope)
+    weight[within], weight_slope[within] = np.abs(turned), np.sign(turned)[:, :, None] * moved
+    return replace(view, nodes=replace(nodes, weight=weight, weight_slope=weight_slope))
+
+
 def _powers(view: View, quantity: Quantity, prefix: str, *, raceways: bool) -> tuple[LoadPowers, LoadPowers]:
-    """Means over time of powers of the loads, and the same moved along the directions."""
+    """Means over the passes of powers of the loads, and the same moved along the directions."""
     signal = view.signals[quantity.channel]
     load = np.maximum(signal.value, 0.0) / KILO
     moved = np.where(signal.value[:, :, None] > 0.0, signal.slope, 0.0) / KILO
@@ -144,7 +161,7 @@ def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> 
 
 def _needs(channel: str, readings: Sequence[str]) -> tuple[str, ...]:
     # what every place of the raceways has met needs no root of a load
-    powers = LOAD_POWERS[:1] if tuple(readings) == ("sectors",) else LOAD_POWERS
+    powers = LOAD_POWERS[::3] if tuple(readings) == ("sectors",) else LOAD_POWERS
     return tuple(channel.removesuffix("ball.force") + name for name in powers)
 
 
@@ -161,7 +178,7 @@ def _kind(name: str) -> Kind:
         check=_check,
         evaluate=lambda view, quantity: life(view, quantity, readings),
         steep=True,
-        beside=PLACES if "sectors" in readings else (),
+        beside=PLACES,
         reduced=lambda runs, quantity: _reduced(runs, quantity, readings),
         needs=lambda channel: _needs(channel, readings),
     )

@@ -1,0 +1,76 @@
+"""Claims about the names of lines: healthy machines have no damaged bearings, frequencies are exact."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model
+from ballpass.runtime.questions.spectrum import spectrum
+from ballpass.runtime.run.solution_file import load_solution
+
+DAMAGED = re.compile("BPFI|BSF|FTF")
+LONG = ("crank_shaper", "four_bar", "offset_slider", "punching_press_hinges", "punching_press_motor")
+SCENES = (
+    "punching_press",
+    "rotor",
+    *(
+        pytest.param(name, marks=pytest.mark.long)
+        for name in (*LONG, "punching_press_tangent", "punching_press_two_way", "toggle_press", "varying_compliance")
+    ),
+)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_healthy_machine_has_no_line_of_a_damaged_bearing(make_model: Callable[..., Model], scene: str) -> None:
+    """At any length of record; BPFO is none: balls of a healthy bearing pass its load."""
+    model = make_model(scene)
+    channel = f"{model.manifest.bearings[0].prefix}inner.x"
+    for turns in (2, 27, 100, None):
+        run = {} if turns is None else {"cycles": turns + 20, "transient": 20}
+        for orders in (False, True):
+            found = model.spectrum(channel, orders=orders, **run)
+            assert not [name for name in found.names if DAMAGED.search(name)], (turns, orders)
+            assert found.names[0] in {"shaft", "BPFO"} or scene == "varying_compliance"
+
+
+def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make_model: Callable[..., Model]) -> None:
+    """2 BSF of the 6204 is the order 3.983532: a line of the spectrum off the fourth at 1/0.016468 = 60.7 turns."""
+    model = make_model("punching_press")
+    short = model.spectrum("inner.x", cycles=29, transient=2, orders=True)
+    fourth = short.names.index("4 shaft")
+    assert short.alternatives[fourth] == "2 BSF (61 turns)"
+    assert "2 BSF (61 turns)" in str(short)
+    long = model.spectrum("inner.x", orders=True)
+    assert long.alternatives[long.names.index("4 shaft")] == ""
+    assert long.resolution == pytest.approx(0.01)
+
+
+def test_lines_of_the_shaft_are_at_its_frequency_and_not_a_sample_below(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    found = model.spectrum("inner.x", cycles=6, transient=2)
+    assert found.position[found.highest[0]] == pytest.approx(500.0 / 60.0, rel=1e-12)
+
+
+def test_bearings_are_heard_where_they_move_something(make_model: Callable[..., Model]) -> None:
+    one_way, two_way = make_model("punching_press"), make_model("punching_press_two_way")
+    assert [mark.name for mark in one_way.spectrum("drive_torque").marks] == ["shaft"]
+    assert [mark.name for mark in one_way.spectrum("reaction.A.y").marks] == ["shaft"]
+    assert len(one_way.spectrum("inner.y").marks) == 5
+    assert len(two_way.spectrum("drive_torque").marks) == 5
+
+
+def test_a_rate_that_is_too_slow_folds_no_line(make_model: Callable[..., Model], tmp_path: Path) -> None:
+    """At 700 Hz a line of the rotor above 350 Hz would stand below it; a file that is sampled so says so."""
+    model = make_model("rotor")
+    fine, slow = (model.spectrum("inner.ay", sample_rate=rate) for rate in (None, 700.0))
+    assert slow.position[-1] <= 350.0
+    there = fine.position <= 350.0
+    np.testing.assert_allclose(slow.height, fine.height[there], rtol=1e-2, atol=1e-3 * np.max(fine.height[there]))
+    model.simulate(60, sample_rate=700.0, outputs=["inner.ay"]).save(tmp_path / "slow.nc")
+    (warning,) = spectrum(load_solution(tmp_path / "slow.nc"), "inner.ay").warnings
+    assert "folded" in warning
