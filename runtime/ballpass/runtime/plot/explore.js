@@ -8,9 +8,13 @@ const written = (value, digits = 6) => {
 const shownValue = (k) => written(values[k] / list[k].factor);
 const quantity = (k, digits = 12) => `${written(values[k] / list[k].factor, digits)}${list[k].unit && ` ${list[k].unit}`}`;
 const changed = (k) => values[k] !== own[k];
-const STEPS = 1000;
+const STEPS = 200;
 const toSlider = ({ low, high, log }, value) => STEPS * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
-const fromSlider = ({ low, high, log }, share) => (log ? low * (high / low) ** share : low + (high - low) * share);
+// Of three digits, so that it is a number that people write.
+const fromSlider = ({ low, high, log, factor }, place) => {
+  const share = place / STEPS, value = log ? low * (high / low) ** share : low + (high - low) * share;
+  return Math.min(Math.max(factor * Number((value / factor).toPrecision(3)), low), high);
+};
 
 function makeRow(k) {
   const one = list[k], row = element(get("rows"), "div", "", { class: "row", "data-name": one.name });
@@ -19,12 +23,13 @@ function makeRow(k) {
   const field = element(row, "input", "", { type: "number", step: "any", id: `value${k}` });
   element(row, "span", one.unit, { class: "unit" });
   const back = element(row, "button", "\u21ba", { type: "button", title: "back to the scene's number", "aria-label": `reset ${one.words}` });
-  // the slider has three digits, so that what it gives is a number that people write
-  range.addEventListener("input", () => change(k, one.factor * Number((fromSlider(one, range.value / STEPS) / one.factor).toPrecision(3))));
-  field.addEventListener("change", () => { if (field.value !== "") change(k, one.factor * Number(field.value)); else show(); });
-  back.addEventListener("click", () => change(k, own[k]));
+  range.addEventListener("change", keepAddress); // not at every step of the slider: browsers limit how often
+  range.addEventListener("input", () => change(k, fromSlider(one, range.value)));
+  field.addEventListener("change", () => { if (field.value !== "") change(k, one.factor * Number(field.value)); else show(); keepAddress(); });
+  back.addEventListener("click", () => { change(k, own[k]); keepAddress(); });
   const show = () => {
-    range.value = toSlider(one, values[k]);
+    // a slider that is moved stays where it is, though its number is rounded
+    if (fromSlider(one, range.value) !== values[k]) range.value = toSlider(one, values[k]);
     set(range, { "aria-valuetext": `${shownValue(k)} ${one.unit}` });
     if (document.activeElement !== field || Number(field.value) !== Number(shownValue(k))) field.value = shownValue(k);
     row.classList.toggle("changed", changed(k));
@@ -37,7 +42,6 @@ function makeRow(k) {
 function change(k, value) {
   values[k] = value;
   rows[k]?.show();
-  keepAddress();
   ask();
 }
 
@@ -83,7 +87,7 @@ function resultsOf(run) {
   const peak = (key, words, unit, measure) => {
     found.push({ key, words, unit, place: measures.length });
     measures.push(measure);
-    series.push(Float64Array.from(run.nodes, measure));
+    series.push(measured(run, measure));
     return series.at(-1);
   };
   solver.bearings.forEach((bearing, k) => {
@@ -92,12 +96,16 @@ function resultsOf(run) {
     rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ball${of}`, "N", rms(run, force));
     if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing.load, row)))));
     peak(`${id}peak_motion`, `Furthest that the rings are apart${of}`, "\u00b5m", (row) => length(motionOf(bearing, row)));
-    const parts = [0, 1].map((axis) => Float64Array.from(run.nodes, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));
+    const parts = [0, 1].map((axis) => measured(run, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));
     rest(`${id}rms_motion`, `Rms of their motion about its mean${of}`, "\u00b5m", rms(run, parts[0].map((x, n) => Math.hypot(x - middle[0], parts[1][n] - middle[1]))));
+  });
+  if (solver.linkage && !solver.bearings.length) numbers.linkage.forces.forEach(({ name, words }, k) => {
+    const source = solver.linkage.forces[k];
+    if (source.columns) peak(`peak_${name}`, `Highest force in joint ${words}`, "N", (row) => length(source.columns.map((column) => row[column])));
   });
   if (solver.torque !== null) {
     peak("peak_torque", "Highest drive torque, either way", "N\u00b7m", (row) => Math.abs(row[solver.torque]));
-    if (run.speed && solver.angle === null) rest("drive_work", "Work of the drive in a turn", "J", Math.sign(run.speed) * TURN * mean(run, Float64Array.from(run.nodes, (row) => row[solver.torque])));
+    if (run.speed && solver.angle === null) rest("drive_work", "Work of the drive in a turn", "J", Math.sign(run.speed) * TURN * mean(run, measured(run, (row) => row[solver.torque])));
   }
   const tops = peaks(run, measures, series);
   return found.map((one) => (one.place === undefined ? one : { ...one, value: tops[one.place].value,
@@ -120,8 +128,8 @@ function showResults(results, olds) {
     element(row, "td", olds[k].value.toPrecision(5));
     element(row, "td", difference(one.value, olds[k].value));
   });
-  get("sum").replaceChildren();
   const one = results[0];
+  get("sum").replaceChildren();
   if (!one) return;
   element(get("sum"), "span", `${one.words} `);
   element(get("sum"), "b", `${one.value.toPrecision(4)} ${one.unit}`);
@@ -165,10 +173,12 @@ function spectrumOf(run, number) {
   const step = 1 / (size * (run.time(1) - run.time(0)));
   return Array.from({ length: lines }, (_, n) => {
     const turnBy = TURN * (n + 1) / size, [c, s] = [Math.cos(turnBy), Math.sin(turnBy)];
-    let [re, im, xr, xi, yr, yi] = [1, 0, 0, 0, 0, 0];
+    let re = 1, im = 0, xr = 0, xi = 0, yr = 0, yi = 0;
     for (let k = 0; k < size; k += 1) {
       xr += xs[k] * re; xi += xs[k] * im; yr += ys[k] * re; yi += ys[k] * im;
-      [re, im] = [re * c - im * s, re * s + im * c];
+      const turned = re * c - im * s;
+      im = re * s + im * c;
+      re = turned;
     }
     return [(n + 1) * step, 2 / size * Math.hypot(xr, xi, yr, yi)];
   });
@@ -188,10 +198,10 @@ function drawSpectrum(bearing, number) {
   }
   for (const x of ticks(0, end)) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
   draw(picture, "text", { x: (left + wide - right) / 2, y: height - 6, "text-anchor": "middle" }, "frequency [Hz]");
-  const line = (places, look) => draw(picture, "polyline", { points: joined(places.filter(([x]) => x <= end).map(([x, y]) => [X(x), Y(y)])), fill: "none", ...look });
-  line(old, { stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2" });
-  line(now, { stroke: "var(--ink)", "stroke-width": 1.3, "stroke-linejoin": "round" });
-  element(section, "p", `amplitude of both directions together${old.length ? "; dotted: the scene's numbers" : ""}`);
+  const stems = (lines, look) => draw(picture, "path", { d: lines.filter(([x]) => x <= end).map(([x, y]) => `M${short(X(x))} ${short(Y(0))}V${short(Y(y))}`).join(""), fill: "none", ...look });
+  stems(now, { stroke: "var(--ink)", "stroke-width": 1.4 });
+  for (const [x, y] of old.filter((one) => one[0] <= end && one[1] > most * 1e-4)) draw(picture, "circle", { cx: X(x), cy: Y(y), r: 1.7, fill: "none", stroke: "var(--signal)" });
+  element(section, "p", `amplitude of both directions together${old.length ? "; rings: the scene's numbers" : ""}`);
   return null;
 }
 besides.push(drawOrbit, drawLoad, drawSpectrum);

@@ -24,6 +24,9 @@ READ_IN = {
     "m^2/s": "mm^2/s",
 }
 
+#: Lengths below this are read in micrometres [m].
+SMALL = 1e-4
+
 #: What people change first, in this order, and how many such numbers stand in front of the search.
 CHOSEN = (
     r"bearings?(\.\w+)?\.clearance",
@@ -53,7 +56,8 @@ def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str,
     rows = []
     for info in manifest.parameters:
         value = values[info.name]
-        unit = units.get(info.name) or READ_IN.get(info.unit, info.unit)
+        small = info.unit == "m" and (abs(value) < SMALL if value else info.name.endswith(".clearance"))
+        unit = units.get(info.name) or ("um" if small else READ_IN.get(info.unit, info.unit))
         low, high, logarithmic = _range(manifest, info, value, values)
         rows.append(
             {
@@ -72,10 +76,10 @@ def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str,
 
 
 def _first(manifest: Manifest, values: Mapping[str, float]) -> list[str]:
-    """What stands in front of the search; zeros, which many scenes have to fill a place, do not."""
+    """What stands in front of the search; of zeros, which many scenes have to fill a place, clearances alone."""
     names = [info.name for info in manifest.parameters]
     found = [name for kind in CHOSEN for name in names if re.fullmatch(kind, name)]
-    return [name for name in dict.fromkeys(found) if values[name] != 0.0][:FIRST]
+    return [name for name in dict.fromkeys(found) if values[name] != 0.0 or name.endswith(".clearance")][:FIRST]
 
 
 def _range(
@@ -93,10 +97,11 @@ def _range(
         # speeds, masses and lengths near zero make other machines
         near = value / 5.0 if info.above == 0.0 or info.unit == "rad/s" else 0.0
         low, high = sorted((near, 3.0 * value))
-    for usual in manifest.usual:
-        if usual.names == (info.name,) and usual.of and usual.least is not None and usual.least < 0.0 < value:
-            # clearances below zero are preloads, which are worth a look
-            low = max(usual.least * abs(values[usual.of]), -value)
+    usual = next((one for one in manifest.usual if one.names == (info.name,) and one.of), None)
+    if usual is not None and usual.least is not None and usual.least < 0.0 <= value:
+        # clearances below zero are preloads, which are worth a look
+        most = abs(usual.least * values[usual.of])
+        low, high = (-min(value, most), high) if value else (-most / 2.0, most / 2.0)
     bounds = ((info.least, info.above), (info.most, info.below))
     low = max([low, *(bound for bound in bounds[0] if bound is not None)])
     high = min([high, *(bound for bound in bounds[1] if bound is not None)])

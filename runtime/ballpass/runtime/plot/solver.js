@@ -50,7 +50,7 @@ async function solve(values, stale) {
     if (k > first) { // both sides of every time at which a load switches, for means and peaks
       if (next < time(k - 1)) next = machine.ballpass_next_switch(machine.one);
       while (next < time(k)) {
-        for (const side of [next - 1e-10 * whole, next]) {
+        for (const side of [Math.max(next - 1e-10 * whole, time(k - 1)), next]) {
           must(machine.ballpass_run_to(machine.one, side));
           jumps.push([k - first, readRow().slice()]);
         }
@@ -79,6 +79,11 @@ function mean({ nodes }, series) {
   let sum = 0;
   for (let k = 1; k < nodes.length; k += 1) sum += (nodes[k][0] - nodes[k - 1][0]) * (series[k] + series[k - 1]);
   return 0.5 * sum / (nodes.at(-1)[0] - nodes[0][0]);
+}
+function measured({ nodes }, measure) {
+  const values = new Float64Array(nodes.length);
+  for (let k = 0; k < nodes.length; k += 1) values[k] = measure(nodes[k]);
+  return values;
 }
 const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * value)));
 
@@ -196,7 +201,7 @@ function drawnOf(run) {
       inner: signalsOf([0, 1].map((axis) => moved.map((pairs) => pairs[axis]))),
       outer: bearing.outer && numbers.bearings[k].outer ? signalsOf(bearing.outer.map((column) => rows.map((one) => 1e6 * one[column]))) : null,
       load: ends && signalsOf([0, 1].map((axis) => ends.map((end) => end[axis]))),
-      settings: "of the numbers on this page" };
+      settings: "with the numbers of this page" };
   });
   return fresh;
 }
