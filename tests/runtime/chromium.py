@@ -1,4 +1,4 @@
-"""A browser without a screen, in real time: pages are opened, keys pressed, and what they ask the network for is noted."""
+"""A browser without a screen, in real time: opens pages, presses keys, notes what they ask the network for."""
 
 from __future__ import annotations
 

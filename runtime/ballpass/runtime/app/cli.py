@@ -366,7 +366,10 @@ def export(
     typer.echo(str(target))
 
 
-for _panel, _commands in {DESCRIBE: (bearings, explain, schema), SIMULATE: (animate, explore, dataset, stream, sweep)}.items():
+for _panel, _commands in {
+    DESCRIBE: (bearings, explain, schema),
+    SIMULATE: (animate, explore, dataset, stream, sweep),
+}.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(as_command(_command))
 for _question in (*QUESTIONS, trade):

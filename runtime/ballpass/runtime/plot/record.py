@@ -116,7 +116,7 @@ class Record:
         return tuple((first % full, first % full + (end - first) % full) for first, end in edges)
 
     def load_window_edges(self) -> list[tuple[str, str]]:
-        """Parameters at which these windows start and end; of a table over the angle, where it leaves and meets zero."""
+        """Parameters at which these windows start and end; of a table over the angle, where it is not zero."""
         found: list[tuple[str, str]] = []
         for item in self.manifest.inputs:
             turning = item.kind == "table" and item.rate

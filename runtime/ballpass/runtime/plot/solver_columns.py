@@ -22,9 +22,8 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
     """What the page's script needs to make `numbers` of another run, and how long that run is."""
     manifest = record.manifest
     names = [name for name, _ in columns_of(manifest)]
-    place = {
-        name: k for k, name in enumerate(info.name for info in (*manifest.parameters, *manifest.constants))
-    }
+    known = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
+    place = {name: k for k, name in enumerate(known)}
     column = {name: k for k, name in enumerate(names)}
     run, mechanism = manifest.run, manifest.mechanism
     speed = mechanism.speed if mechanism is not None else manifest.bearing.ring_speed if manifest.bearing else None
