@@ -77,6 +77,7 @@ NAMED: dict[str, dict[str, str]] = {
         "up to 1000 a turn": "a limit of the code",
         "from 0 to the highest": "a scale",
     },
+    "docs/howto/explore.md": {"browsers from 2023 on": "when the last of them learned to unpack gzip"},
     "docs/howto/install.md": {
         "x86-64, Python 3.11": "the machine",
         "CasADi is 290 MB": "measured by scripts/sizes.py",

@@ -628,6 +628,29 @@ class Model(PointModel, Questions):
         numbers = self.numbers(solution.parameters)
         return refine_peak(self, numbers, solution, name, kind=kind)
 
+    def explore(self, path: str | Path, *, units: Mapping[str, str] | None = None) -> Path:
+        """Write a page with the solver in it: sliders for all numbers, and pictures and peaks that follow them.
+
+        It needs no server, no network and no installation where it is opened; ziglang is needed to write it.
+
+        Parameters
+        ----------
+        path : file to write, HTML
+        units : by name of a parameter, where the page shows it in another unit than the usual
+
+        Raises
+        ------
+        RequestError
+            The compiler is missing; the model has no states, or nothing that can be drawn.
+        SimulationError, CompileError
+            The run of the scene's own numbers, or the compiler, failed.
+        """
+        from ballpass.runtime.export.web_assembly import check_compiler
+        from ballpass.runtime.plot.explore import write_exploration
+
+        check_compiler()
+        return write_exploration(self, self.simulate(), path, units=units)
+
     def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
         """Breakpoints, smoothness and time scales, and the method that suits them.
 

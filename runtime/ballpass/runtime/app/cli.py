@@ -19,6 +19,7 @@ from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
 from ballpass.runtime.app.commands.declared import as_command, question_command
 from ballpass.runtime.app.commands.explain import explain
+from ballpass.runtime.app.commands.explore import explore
 from ballpass.runtime.app.commands.load_scene import (
     Asked,
     read_asked,
@@ -376,7 +377,10 @@ def export(
     typer.echo(str(target))
 
 
-for _panel, _commands in {DESCRIBE: (bearings, explain, schema), SIMULATE: (animate, dataset, stream, sweep)}.items():
+for _panel, _commands in {
+    DESCRIBE: (bearings, explain, schema),
+    SIMULATE: (animate, explore, dataset, stream, sweep),
+}.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(as_command(_command))
 for _question in (*QUESTIONS, trade):

@@ -32,7 +32,7 @@ def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0,
     RequestError
         The steady part is shorter, there is nothing to draw, or no such bearing.
     """
-    return page(to_plain(choose_frames(_records(model, solution, bearing), turns)))
+    return page(to_plain(choose_frames(records_of(model, solution, bearing), turns)))
 
 
 def write_animation(
@@ -76,7 +76,7 @@ def write_animation(
     count = count_pictures(target.suffix, turns, pictures)
     from ballpass.runtime.plot.movie import write_movie
 
-    return write_movie(choose_frames(_records(model, solution, bearing), turns, count), target, progress=progress)
+    return write_movie(choose_frames(records_of(model, solution, bearing), turns, count), target, progress=progress)
 
 
 def count_pictures(suffix: str, turns: float, pictures: int | None) -> int:
@@ -92,7 +92,7 @@ def count_pictures(suffix: str, turns: float, pictures: int | None) -> int:
     return count
 
 
-def _records(model: PointModel, solution: Solution, name: str | None) -> list[Record]:
+def records_of(model: PointModel, solution: Solution, name: str | None) -> list[Record]:
     """Records of all bearings, that of the named one first."""
     records = [gather(model, solution, bearing) for bearing in model.manifest.bearings or (None,)]
     if name is not None:

@@ -8,13 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.record import FRAME, Array, Record
 from ballpass.runtime.plot.shapes import Points, exaggeration, guide_direction, links, used_points
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract import MechanismInfo
 
 #: Samples of a page, at most: a turn in steps of a third of a degree.
 FRAMES = 1000
@@ -146,7 +149,7 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
     used = used_points(mechanism)
     corners = np.vstack([paths[key] for key in used])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    shown = [*used, *(key for key in paths if key[1] == "center_of_mass" and key not in used)]
+    shown = shown_points(mechanism)
     guides = []
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
@@ -192,6 +195,13 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             *_springs(record, samples, shown, paths),
         ],
     }
+
+
+def shown_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
+    """Points of a page's linkage, in its order: those that are used, then the centres of mass."""
+    used = used_points(mechanism)
+    every = [(info.body, info.point) for info in mechanism.points]
+    return [*used, *(key for key in every if key[1] == "center_of_mass" and key not in used)]
 
 
 def _reactions(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
-"""A moving picture as one HTML file that needs nothing else: no network, no server, no library.
+"""A page that draws a run, as one HTML file that needs nothing else: no network, no server, no library.
 
-In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` says what it looks like,
-``animation.js`` what it does.
+In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` and ``explore.html`` are
+pages; ``pictures.html``, ``.css`` and ``.js`` are what both show of a run, how it looks and how it moves.
 """
 
 from __future__ import annotations
@@ -10,18 +10,22 @@ import html
 import json
 from collections.abc import Mapping
 from importlib.resources import files
-from typing import Any
+from typing import Any, Literal
 
 
-def page(numbers: Mapping[str, Any]) -> str:
+def page(numbers: Mapping[str, Any], kind: Literal["animation", "explore"] = "animation") -> str:
     """Text of the page."""
     text = json.dumps(numbers, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     parts = {
+        "/*STYLE*/": _template("pictures.css").rstrip(),
+        "/*PICTURES*/": _template("pictures.html").rstrip(),
+        "/*SCRIPT*/": _template("pictures.js"),
         "/*TITLE*/": html.escape(str(numbers["title"])),
-        "/*SCRIPT*/": _template("animation.js"),
         "/*DATA*/": text.replace("<", "\\u003c"),  # no word of a scene ends the element
     }
-    found = _template("animation.html")
+    if kind == "explore":
+        parts["/*SCRIPT*/"] += _template("solver.js") + _template("explore.js")
+    found = _template(f"{kind}.html")
     for mark, content in parts.items():
         found = found.replace(mark, content)
     return found

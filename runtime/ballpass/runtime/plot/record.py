@@ -112,13 +112,16 @@ class Record:
         A load that acts all the turn has none.
         """
         full = 2.0 * np.pi
-        found = []
+        edges = [(self.parameter(start), self.parameter(end)) for start, end in self.load_window_edges()]
+        return tuple((first % full, first % full + (end - first) % full) for first, end in edges)
+
+    def load_window_edges(self) -> list[tuple[str, str]]:
+        """Parameters at which these windows start and end; of a table over the angle, where it is not zero."""
+        found: list[tuple[str, str]] = []
         for item in self.manifest.inputs:
             turning = item.kind == "table" and item.rate
-            for start, end in _acting_rows(item, self.parameter) if turning else item.windows:
-                first = self.parameter(start)
-                found.append((first % full, first % full + (self.parameter(end) - first) % full))
-        return tuple(found)
+            found += _acting_rows(item, self.parameter) if turning else item.windows
+        return found
 
     def frequencies(self) -> KinematicFrequencies | None:
         """Kinematic frequencies of the bearing [Hz]; None without a bearing, or where the speed is a state."""

@@ -1,14 +1,23 @@
 "use strict";
 // Moves linkage, bearing and cursors of the page to one sample of the run: the slider's, or that of #angle=90 or #time=0.1.
-const data = JSON.parse(document.getElementById("data").textContent);
-const get = (id) => document.getElementById(id), slider = get("frame"), frames = data.time.values.map((_, k) => k);
-const last = frames.length - 1;
+const numbers = JSON.parse(document.getElementById("data").textContent);
+const get = (id) => document.getElementById(id), slider = get("frame");
+// The run that is shown; of one that it is compared with, dashed behind it: its numbers and its horizontal axis.
+let data, frames, last, across, begin, end, compared = null;
+function use(run) {
+  data = run;
+  frames = data.time.values.map((_, k) => k);
+  last = frames.length - 1;
+  across = data.turning ? all(data.angle) : all(data.time).map((t) => 1e3 * t);
+  [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
+}
 const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
-const all = (signal) => frames.map((k) => at(signal, k));
+const all = (signal) => signal.values.map((_, k) => at(signal, k));
 const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
 const length = ([x, y]) => Math.hypot(x, y);
 const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
-const joined = (places) => places.map(([x, y]) => `${x.toFixed(3)},${y.toFixed(3)}`).join(" ");
+const short = (value) => Math.round(1e3 * value) / 1e3; // several times as fast as toFixed
+const joined = (places) => places.map(([x, y]) => `${short(x)},${short(y)}`).join(" ");
 const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
 
 function draw(parent, kind, attributes, text = "", node = document.createElementNS("http://www.w3.org/2000/svg", kind)) {
@@ -37,6 +46,7 @@ function arrow(parent, colour) {
 // ------------------------------------------------------------------------------------------------------------ linkage
 function drawLinkage(parts) {
   const picture = get("linkage").querySelector("svg"), moves = [], ink = { stroke: "var(--ink)", "stroke-width": 0.45 };
+  picture.replaceChildren();
   // Words stand where they cover least: [x, y, half the width, half the height, weight] of what is there.
   let full = [];
   const covered = (box) => full.reduce((sum, one) => (Math.abs(one[0] - box[0]) < one[2] + box[2] && Math.abs(one[1] - box[1]) < one[3] + box[3] ? sum + one[4] : sum), 0);
@@ -201,9 +211,6 @@ function drawBearing(bearing) {
 }
 
 // ------------------------------------------------------------------------------------------------------------- charts
-const across = data.turning ? all(data.angle) : all(data.time).map((t) => 1e3 * t);
-const [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
-
 function ticks(low, high) {
   const raw = (high - low) / 4 || 1, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].find((one) => one * power >= raw) * power;
   return Array.from({ length: 8 }, (_, n) => Number(((Math.ceil(low / step - 1e-9) + n) * step).toPrecision(12))).filter((value) => value <= high + 1e-9 * step);
@@ -213,7 +220,8 @@ function drawChart(title, unit, curves) {
   const [width, height, left, right, top, below] = [420, 190, 56, 14, 8, 40], section = element(get("charts"), "section");
   element(section, "h2", `${title} [${unit}]`);
   const picture = draw(section, "svg", { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": title });
-  const values = curves.map((curve) => all(curve.signal)), [low, high] = [-highest(values.flat().map((one) => -one)), highest(values.flat())];
+  const values = curves.map((curve) => all(curve.signal)), olds = curves.map((curve) => (curve.before ? all(curve.before) : []));
+  const shown = [...values, ...olds].flat(), [low, high] = [-highest(shown.map((one) => -one)), highest(shown)];
   const X = (x) => left + (x - begin) / (end - begin || 1) * (width - left - right), Y = (y) => top + (high - y) / (high - low) * (height - top - below);
   for (const [from, to] of data.windows) {
     for (let turn = Math.floor(begin / 360) - 1; turn * 360 <= end; turn += 1) {
@@ -228,10 +236,13 @@ function drawChart(title, unit, curves) {
   const step = 90 * Math.ceil((end - begin) / 540), marks = data.turning ? frames.map((k) => step * (Math.ceil(begin / step - 1e-6) + k)).filter((x) => x <= end) : ticks(begin, end);
   for (const x of marks) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
   draw(picture, "text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, data.turning ? `${data.driver} angle [\u00b0]` : "time [ms]");
+  olds.forEach((old) => draw(picture, "polyline", {
+    points: joined(old.map((y, k) => [X(compared.across[k]), Y(y)])), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
+  }));
   curves.forEach(({ colour = "var(--ink)", wide = 1.5, dashes = "none" }, n) => draw(picture, "polyline", {
     points: joined(values[n].map((y, k) => [X(across[k]), Y(y)])), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
   }));
-  element(section, "p", [...curves.map((curve) => curve.name), data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
+  element(section, "p", [...curves.map((curve) => curve.name), olds.flat().length && "dotted: the scene's numbers", data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
   const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });
   const follow = (event) => {
     const box = picture.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * width;
@@ -264,7 +275,11 @@ function writeNumbers(bearing) {
 }
 
 const nearest = (distance) => frames.reduce((best, k) => (distance(k) < distance(best) ? k : best), 0);
-let moves = [], frame = data.peak, playing = 0;
+let moves = [], frame = 0, playing = 0, moveLinkage = null;
+// Of a page: what is drawn besides, each as a function of the bearing that gives what moves with the position.
+const besides = [];
+// The same signal of the run that is compared with.
+const before = (find) => (compared ? find(compared.run) : null);
 
 function build(number) {
   const bearing = data.bearings[number];
@@ -272,13 +287,14 @@ function build(number) {
   moves = data.linkage ? [moveLinkage] : [];
   if (bearing) {
     const worst = bearing.force.map((signal) => highest(all(signal))), top = worst.indexOf(highest(worst));
+    const old = before((run) => run.bearings[number]), most = old && old.force.map((signal) => highest(all(signal)));
     moves.push(drawBearing(bearing), drawChart("Ball forces", "N", [...bearing.force.map((signal) => ({ signal, colour: "var(--bar)", wide: 0.8 })),
-      { signal: bearing.force[top], name: `strong: ball ${top + 1}, the most loaded; faint: the others` }]));
-    moves.push(drawChart("Inner ring against outer", "\u00b5m", [{ signal: bearing.inner[0], name: "solid: x" },
-      { signal: bearing.inner[1], colour: "var(--signal)", dashes: "5 3", name: "dashed: y" }]));
+      { signal: bearing.force[top], before: old && old.force[most.indexOf(highest(most))], name: `strong: ball ${top + 1}, the most loaded; faint: the others` }]));
+    moves.push(drawChart("Inner ring against outer", "\u00b5m", [{ signal: bearing.inner[0], before: old?.inner[0], name: "solid: x" },
+      { signal: bearing.inner[1], before: old?.inner[1], colour: "var(--signal)", dashes: "5 3", name: "dashed: y" }]));
   }
-  if (data.torque) moves.push(drawChart("Drive torque", "N\u00b7m", [{ signal: data.torque }]));
-  moves.push(...writeNumbers(bearing));
+  if (data.torque) moves.push(drawChart("Drive torque", "N\u00b7m", [{ signal: data.torque, before: before((run) => run.torque) }]));
+  moves.push(...besides.map((more) => more(bearing, number)).filter(Boolean), ...writeNumbers(bearing));
   go(frame);
 }
 
@@ -320,8 +336,14 @@ function follow() {
   else if (asked.has("time")) go(nearest((k) => Math.abs(at(data.time, k) - asked.get("time"))));
 }
 
-const moveLinkage = data.linkage && drawLinkage(data.linkage);
-slider.max = last;
+// A run in place of the one that is shown, at the same position.
+function showRun(run) {
+  use(run);
+  slider.max = last;
+  moveLinkage = data.linkage && drawLinkage(data.linkage);
+  build(Number(get("bearing").value));
+}
+
 slider.addEventListener("input", () => { stop(); go(Number(slider.value)); });
 get("play").addEventListener("click", play);
 get("peak").addEventListener("click", () => { stop(); go(data.peak); });
@@ -329,12 +351,14 @@ get("bearing").addEventListener("change", () => build(Number(get("bearing").valu
 addEventListener("hashchange", () => { stop(); follow(); });
 addEventListener("keydown", (event) => {
   const steps = { ArrowLeft: -1, ArrowRight: 1, PageDown: -50, PageUp: 50, " ": 0 }[event.key];
-  if (steps === undefined || ["BUTTON", "SELECT", "INPUT"].includes(document.activeElement.tagName)) return;
+  if (steps === undefined || ["BUTTON", "SELECT", "INPUT", "TEXTAREA", "SUMMARY"].includes(document.activeElement.tagName)) return;
   event.preventDefault();
   if (steps) { stop(); go(frame + steps); } else play();
 });
-data.bearings.forEach((bearing, number) => get("bearing").append(new Option(bearing.name, number)));
-for (const [id, shown] of Object.entries({ choose: data.bearings.length > 1, rings: data.bearings.length, linkage: data.linkage,
-  sprung: data.linkage?.springs.length, turned: data.torque && data.linkage && data.linkage.driver !== null })) get(id).hidden = !shown;
-build(0);
+numbers.bearings.forEach((bearing, number) => get("bearing").append(new Option(bearing.name, number)));
+for (const [id, shown] of Object.entries({ choose: numbers.bearings.length > 1, rings: numbers.bearings.length, linkage: numbers.linkage,
+  sprung: numbers.linkage?.springs.length, turned: numbers.torque && numbers.linkage && numbers.linkage.driver !== null })) get(id).hidden = !shown;
+get("bearing").value = 0;
+frame = numbers.peak;
+showRun(numbers);
 follow();

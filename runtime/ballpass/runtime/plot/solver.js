@@ -1,0 +1,207 @@
+
+// ------------------------------------------------------------------------------------------------------------- solver
+// The exported C program, compiled to WebAssembly: a run of given numbers, and what of it is drawn.
+const solver = numbers.solver, width = solver.columns.length + solver.drawn.reduce((sum, count) => sum + count, 0);
+const [pointsAt, cagesAt, inputsAt] = [0, solver.drawn[0], solver.drawn[0] + solver.drawn[1]].map((far) => solver.columns.length + far);
+const TURN = 2 * Math.PI, DEGREE = Math.PI / 180;
+let machine = null;
+
+async function loadSolver() {
+  const packed = Uint8Array.from(atob(solver.module), (letter) => letter.charCodeAt(0));
+  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const module = await WebAssembly.compile(await new Response(unpacked).arrayBuffer()), system = {};
+  // The solver reads and writes no files; what its library could ask a system for answers "not supported".
+  for (const { module: space, name } of WebAssembly.Module.imports(module)) (system[space] ??= {})[name] = () => 52;
+  const { exports } = await WebAssembly.instantiate(module, system);
+  exports._initialize?.();
+  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), saved: exports.malloc(exports.ballpass_state_size()) };
+  if (!machine.one || !machine.row || !machine.saved) throw new Error("The memory is too small for the solver.");
+}
+
+const inMemory = (place, count) => new Float64Array(machine.memory.buffer, place, count);
+function complaint() {
+  const bytes = new Uint8Array(machine.memory.buffer, machine.ballpass_error(machine.one));
+  return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
+}
+const must = (answer) => { if (answer) throw new Error(complaint()); };
+
+function readRow() {
+  must(machine.ballpass_read(machine.one, machine.row));
+  machine.ballpass_drawn(machine.one, machine.row + 8 * solver.columns.length);
+  return inMemory(machine.row, width);
+}
+
+// A run of these numbers, or null where `stale` says that it is not wanted any more: its steady samples, row after row.
+async function solve(values, stale) {
+  machine.ballpass_stop(machine.one);
+  const faults = values.map((value, place) => (machine.ballpass_set_at(machine.one, place, value) ? complaint() : "")).filter(Boolean);
+  if (faults.length) throw new Error(faults.join("\n"));
+  must(machine.ballpass_start(machine.one, 0));
+  const known = inMemory(machine.ballpass_values(machine.one), solver.places).slice(), { cycles, duration, transient, samples } = solver.run;
+  const speed = solver.speed === null ? 0 : known[solver.speed], turn = speed ? TURN / Math.abs(speed) : Infinity;
+  const whole = cycles ? cycles * turn : duration, count = Math.max(1, Math.round(samples * (turn < Infinity ? whole / turn : 1)));
+  if (transient && !speed) throw new Error("Transient cycles are turns, and nothing turns in this run.");
+  const time = (k) => whole * (k / count), least = transient ? transient * turn * (1 - 1e-12) : 0;
+  let first = 0, began = performance.now();
+  while (time(first) < least) first += 1;
+  const rows = new Float64Array((count - first + 1) * width), jumps = [];
+  let next = -1;
+  for (let k = 0; k <= count; k += 1) {
+    if (k > first) { // both sides of every time at which a load switches, for means and peaks
+      if (next < time(k - 1)) next = machine.ballpass_next_switch(machine.one);
+      while (next < time(k)) {
+        for (const side of [Math.max(next - 1e-10 * whole, time(k - 1)), next]) {
+          must(machine.ballpass_run_to(machine.one, side));
+          jumps.push([k - first, readRow().slice()]);
+        }
+        next = machine.ballpass_next_switch(machine.one);
+      }
+    }
+    if (k >= first || k % 32 === 0) must(machine.ballpass_run_to(machine.one, time(k)));
+    if (k === first) machine.ballpass_save(machine.one, machine.saved);
+    if (k >= first) rows.set(readRow(), (k - first) * width);
+    if (k % 32 === 0 && performance.now() - began > 40) { // the page stays alive
+      await new Promise((go) => { setTimeout(go); });
+      if (stale()) return null;
+      began = performance.now();
+    }
+  }
+  const nodes = [];
+  for (let k = 0, jump = 0; k <= count - first; k += 1) {
+    for (; jump < jumps.length && jumps[jump][0] === k; jump += 1) nodes.push(jumps[jump][1]);
+    nodes.push(rows.subarray(k * width, (k + 1) * width));
+  }
+  return { values, known, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
+}
+
+// Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.
+function mean({ nodes }, series) {
+  let sum = 0;
+  for (let k = 1; k < nodes.length; k += 1) sum += (nodes[k][0] - nodes[k - 1][0]) * (series[k] + series[k - 1]);
+  return 0.5 * sum / (nodes.at(-1)[0] - nodes[0][0]);
+}
+function measured({ nodes }, measure) {
+  const values = new Float64Array(nodes.length);
+  for (let k = 0; k < nodes.length; k += 1) values[k] = measure(nodes[k]);
+  return values;
+}
+const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * value)));
+
+// Highest values of measures of a sample, between samples too: the steps do not depend on what is read.
+function peaks(run, measures, series) {
+  const FINE = 32, [start, step] = [run.time(0), (run.time(run.count - 1) - run.time(0)) / ((run.count - 1) * FINE)];
+  const found = series.map((values) => {
+    const top = values.reduce((best, value, k) => (value > values[best] ? k : best), 0), time = run.nodes[top][0];
+    return { value: values[top], time, sample: Math.round((time - start) / (FINE * step)), fine: [] };
+  });
+  const asked = new Set(found.flatMap(({ sample }) => Array.from({ length: 2 * FINE + 1 }, (_, n) => (sample - 1) * FINE + n)));
+  const places = [...asked].filter((n) => n >= 0 && n <= (run.count - 1) * FINE).sort((a, b) => a - b);
+  must(machine.ballpass_restore(machine.one, machine.saved, machine.ballpass_state_size()));
+  for (const n of places) {
+    must(machine.ballpass_run_to(machine.one, n % FINE ? start + n * step : run.time(n / FINE)));
+    const here = readRow();
+    found.forEach((one, k) => { if (Math.abs(n - one.sample * FINE) <= FINE) one.fine.push([n, measures[k](here)]); });
+  }
+  for (const one of found) {
+    const top = one.fine.reduce((best, now, k) => (now[1] > one.fine[best][1] ? k : best), 0), [a, b, c] = [top - 1, top, top + 1].map((k) => one.fine[k]?.[1]);
+    // the parabola through three neighbours, where they are: not across a jump
+    const bend = a - 2 * b + c, smooth = bend < 0 && 2 * b - a - c < 1e-3 * Math.abs(b), way = smooth ? 0.5 * (a - c) / bend : 0;
+    const value = smooth ? b - 0.25 * (a - c) * way : b;
+    if (value > one.value) [one.value, one.time] = [value, start + (one.fine[top][0] + way) * step];
+  }
+  return found;
+}
+
+// ---------------------------------------------------------------------------------------------------- from run to page
+const signalOf = (values, most = highest(values.map(Math.abs))) => {
+  const decimals = most > 1e-12 ? 4 - Math.floor(Math.log10(most)) : 0;
+  return { decimals, values: values.map((value) => value * 10 ** decimals) };
+};
+// Signals of one kind have the same decimals.
+const signalsOf = (columns) => { const most = highest(columns.flat().map(Math.abs)); return columns.map((values) => signalOf(values, most)); };
+
+function angleOf(run, row) {
+  if (solver.angle !== null) return row[solver.angle];
+  return (solver.start === null ? 0 : run.known[solver.start]) + run.speed * row[0];
+}
+
+const between = (angle, [start, end]) => ((angle - start) % TURN + TURN) % TURN < ((end - start) % TURN + TURN) % TURN;
+function interpolated(angle, knots, heights) {
+  const turned = ((angle - knots[0]) % TURN + TURN) % TURN + knots[0], next = knots.findIndex((knot) => knot > turned), n = next < 0 ? knots.length : next;
+  const [a, b] = [knots[n - 1], n < knots.length ? knots[n] : knots[0] + TURN];
+  return heights[n - 1] + (heights[n % knots.length] - heights[n - 1]) * (turned - a) / (b - a);
+}
+
+function forceOf(run, source, row, points) {
+  const value = (place) => run.known[place];
+  if (source.columns) return source.columns.map((column) => source.sign * row[column]);
+  if (source.between) {
+    const [from, to] = source.between.map((point) => points[point]), way = [to[0] - from[0], to[1] - from[1]], size = Math.max(length(way), 1e-12);
+    return way.map((part) => source.sign * row[source.tension] * part / size);
+  }
+  let amount = 1;
+  if (source.input !== undefined) amount = row[inputsAt + source.input];
+  else if (source.borders) amount = Number(source.borders.some((edges) => between(angleOf(run, row), edges.map(value))));
+  else if (source.table) amount = interpolated(angleOf(run, row), ...source.table.map((places) => places.map(value)));
+  if (amount === 0) return [0, 0];
+  if (source.cartesian) return source.cartesian.map(value);
+  const [size, direction] = source.polar ? source.polar.map(value) : [amount, value(source.direction)];
+  return [size * Math.cos(direction), size * Math.sin(direction)];
+}
+
+function loadOf(run, load, row) {
+  const share = load.sign * (load.share === null ? 1 : run.known[load.share]) / (load.count === null ? 1 : run.known[load.count]);
+  return load.columns.map((column) => share * row[column]);
+}
+
+const motionOf = (bearing, row) => bearing.inner.map((column, axis) => 1e6 * (row[column] - (bearing.outer ? row[bearing.outer[axis]] : 0)));
+
+// What the pictures show of a run, its last turn, in the form in which the page brings the scene's own.
+function drawnOf(run) {
+  const row = (k) => run.rows.subarray(k * width, (k + 1) * width), angles = Array.from({ length: run.count }, (_, k) => angleOf(run, row(k)));
+  const sense = Math.sign(angles[run.count - 1] - angles[0]), turning = sense !== 0 && angles.every((angle, k) => !k || sense * (angle - angles[k - 1]) > 0);
+  let begins = 0;
+  if (turning) while (begins + 1 < run.count && Math.abs(angles[run.count - 1] - angles[begins + 1]) >= TURN * (1 - 1e-9)) begins += 1;
+  // every bearing's highest force is among the positions
+  const tops = solver.bearings.map((bearing) => {
+    let best = [-Infinity, begins];
+    for (let k = begins; k < run.count; k += 1) best = bearing.force.reduce((most, column) => (row(k)[column] > most[0] ? [row(k)[column], k] : most), best);
+    return best;
+  }), stride = Math.ceil((run.count - begins) / 1000), chosen = [];
+  for (let k = begins; k < run.count; k += 1) if ((k - begins) % stride === 0 || k === run.count - 1 || tops.some((top) => top[1] === k)) chosen.push(k);
+  const peak = tops.length ? tops.reduce((best, top) => (top[0] > best[0] ? top : best))[1] : begins;
+  const rows = chosen.map(row), shift = 360 * Math.floor(Math.min(...chosen.map((k) => angles[k])) / TURN + 1e-9);
+  const fresh = { ...numbers, turning, peak: chosen.indexOf(peak), time: { decimals: 7, values: rows.map((one) => 1e7 * one[0]) } };
+  fresh.angle = numbers.angle && { decimals: 3, values: chosen.map((k) => 1e3 * (angles[k] / DEGREE - shift)) };
+  fresh.windows = turning ? solver.windows.map((edges) => edges.map((place) => run.known[place] / DEGREE)).map(([from, to]) => {
+    const first = ((from % 360) + 360) % 360;
+    return [first, first + (((to - from) % 360) + 360) % 360];
+  }) : [];
+  fresh.torque = solver.torque === null ? null : signalOf(rows.map((one) => one[solver.torque]));
+  if (solver.linkage) {
+    const places = rows.map((one) => solver.linkage.points.map((point) => [one[pointsAt + 2 * point], one[pointsAt + 2 * point + 1]]));
+    const corners = numbers.linkage.bodies.flatMap((body) => body.points).concat(numbers.linkage.names.map((name) => name.at));
+    const ends = (pick) => [0, 1].map((axis) => places.reduce((sum, now) => corners.reduce((best, point) => pick(best, now[point][axis]), sum), places[0][corners[0]][axis]));
+    fresh.linkage = { ...numbers.linkage, low: ends(Math.min), high: ends(Math.max),
+      points: solver.linkage.points.map((_, point) => signalsOf([0, 1].map((axis) => places.map((now) => now[point][axis])))),
+      forces: numbers.linkage.forces.map((force, k) => {
+        const parts = rows.map((one, n) => forceOf(run, solver.linkage.forces[k], one, places[n])), [x, y] = signalsOf([0, 1].map((axis) => parts.map((part) => part[axis])));
+        return { ...force, x, y };
+      }) };
+  }
+  fresh.bearings = solver.bearings.map((bearing, k) => {
+    const [moved, ball, clearance] = [rows.map((one) => motionOf(bearing, one)), run.known[bearing.ball], run.known[bearing.clearance]];
+    const first = rows.map((one) => one[cagesAt + bearing.cage] / DEGREE), whole = 360 * Math.floor(Math.min(...first) / 360 + 1e-9);
+    const furthest = Math.max(Math.abs(clearance) / 2, 1e-6 * highest(moved.map(length)), 1e-12), share = 0.25 * ball / furthest, decade = 10 ** Math.floor(Math.log10(share));
+    const ends = bearing.load && rows.map((one) => loadOf(run, bearing.load, one));
+    return { ...numbers.bearings[k], pitch: run.known[bearing.pitch], ball, clearance,
+      factor: Math.max(1, decade * Math.max(...[1, 2, 5].filter((digit) => digit * decade <= share))),
+      ball_angle: { decimals: 3, values: first.map((angle) => 1e3 * (angle - whole)) },
+      force: signalsOf(bearing.force.map((column) => rows.map((one) => one[column]))),
+      inner: signalsOf([0, 1].map((axis) => moved.map((pairs) => pairs[axis]))),
+      outer: bearing.outer && numbers.bearings[k].outer ? signalsOf(bearing.outer.map((column) => rows.map((one) => 1e6 * one[column]))) : null,
+      load: ends && signalsOf([0, 1].map((axis) => ends.map((end) => end[axis]))),
+      settings: "with the numbers of this page" };
+  });
+  return fresh;
+}

@@ -1,0 +1,136 @@
+"""Where a page with the solver in it finds what it draws: columns of a sample, places of numbers, signs.
+
+In: the manifest and the plain numbers of `animation.to_plain`, which name what is drawn.  Out: plain numbers for JSON.
+
+A sample of ``ballpass_read`` has the columns of `columns_of`; ``ballpass_drawn`` gives points, cage angles and inputs.
+Numbers are named by their place among parameters and, behind these, derived constants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ballpass.runtime.contract import BearingInfo, Manifest, force_components, table_direction
+from ballpass.runtime.export.scene_numbers import columns_of
+from ballpass.runtime.export.web_assembly import drawn_columns
+from ballpass.runtime.plot.animation import shown_points
+from ballpass.runtime.plot.record import FRAME, Record
+
+
+def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page's script needs to make `numbers` of another run, and how long that run is."""
+    manifest = record.manifest
+    names = [name for name, _ in columns_of(manifest)]
+    known = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
+    place = {name: k for k, name in enumerate(known)}
+    column = {name: k for k, name in enumerate(names)}
+    run, mechanism = manifest.run, manifest.mechanism
+    speed = mechanism.speed if mechanism is not None else manifest.bearing.ring_speed if manifest.bearing else None
+    drawn = [info for info in (bearing_of(manifest, one["name"]) for one in numbers["bearings"]) if info is not None]
+    return {
+        "columns": names,
+        "units": [unit for _, unit in columns_of(manifest)],
+        "drawn": drawn_columns(manifest),
+        "places": len(place),
+        "run": {
+            "cycles": run.cycles,
+            "duration": run.duration,
+            "transient": run.transient_cycles,
+            "samples": run.samples_per_cycle,
+        },
+        "speed": None if speed is None else place[speed],
+        "start": None if mechanism is None else place[mechanism.start_angle],
+        "angle": column[mechanism.angle] if mechanism is not None and mechanism.angle else None,
+        "windows": [[place[start], place[end]] for start, end in record.load_window_edges()],
+        "torque": column.get("drive_torque"),
+        "linkage": None if mechanism is None else _linkage(manifest, numbers["linkage"]["forces"], place, column),
+        "bearings": [_bearing(record, info, place, column) for info in drawn],
+    }
+
+
+def bearing_of(manifest: Manifest, name: str) -> BearingInfo | None:
+    """The bearing of a name, which is empty of the only one."""
+    return next((info for info in manifest.bearings if info.name == name), None)
+
+
+def _linkage(
+    manifest: Manifest, forces: list[dict[str, Any]], place: Mapping[str, int], column: Mapping[str, int]
+) -> dict[str, Any]:
+    mechanism = manifest.mechanism
+    assert mechanism is not None  # of those only
+    shown = shown_points(mechanism)
+    every = [(info.body, info.point) for info in mechanism.points]
+    sources: dict[str, dict[str, Any]] = {}
+    for name, _, _, _, second, _ in mechanism.joints:
+        if f"reaction.{name}.x" in column:
+            sign = -1 if second == FRAME else 1
+            columns = [column[f"reaction.{name}.{axis}"] for axis in "xy"]
+            sources[f"reaction.{name}"] = {"columns": columns, "sign": sign}
+    for name, _, _, given in mechanism.forces:
+        sources[f"force.{name}"] = _applied(manifest, name, given, place)
+    for label, *ends in mechanism.springs:
+        known = next((name for name in (f"{label}.tension", f"{label}.force") if name in column), None)
+        if known is not None:
+            points = [shown.index((ends[0], ends[1])), shown.index((ends[2], ends[3]))]
+            for key, way in ((ends[0], points), (ends[2], points[::-1])):
+                sign = 1 if known.endswith("tension") else -1
+                sources[f"{label}.{key}"] = {"tension": column[known], "sign": sign, "between": way}
+    return {"points": [every.index(key) for key in shown], "forces": [sources[force["name"]] for force in forces]}
+
+
+def _applied(manifest: Manifest, name: str, given: str, place: Mapping[str, int]) -> dict[str, Any]:
+    """As `Record.applied_forces`: components, and what says whether or how much it acts."""
+    cartesian, polar = force_components(name)
+    found: dict[str, Any] = {}
+    if cartesian[0] in place:
+        found["cartesian"] = [place[component] for component in cartesian]
+    elif polar[0] in place:
+        found["polar"] = [place[component] for component in polar]
+    else:
+        found["direction"] = place[table_direction(name)]
+    inputs = [item.name for item in manifest.inputs]
+    if given in inputs:
+        found["input"] = inputs.index(given)
+    elif given:  # the driver's angle is a state
+        borders = [item.windows[0] for item in manifest.inputs if item.name.startswith(f"border.{name}.")]
+        if borders:
+            found["borders"] = [[place[start], place[end]] for start, end in borders]
+        else:
+            columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
+            found["table"] = [[k for known, k in place.items() if known.startswith(one)] for one in columns]
+    return found
+
+
+def _bearing(
+    record: Record, bearing: BearingInfo, place: Mapping[str, int], column: Mapping[str, int]
+) -> dict[str, Any]:
+    def pair(name: str) -> list[int] | None:
+        both = [f"{name}.{axis}" for axis in "xy"]
+        return [column[one] for one in both] if all(one in column for one in both) else None
+
+    def own(name: str) -> str:
+        return f"{bearing.prefix}{name}"
+
+    force = own("ball.force") if own("ball.force[1]") in column else own("ball.elastic_force")
+    load: dict[str, Any] | None = None
+    if pair(own("load")) is not None:
+        load = {"columns": pair(own("load")), "sign": 1, "share": None, "count": None}
+    elif record.manifest.mechanism is not None and pair(f"reaction.{bearing.joint}") is not None:
+        first = next(item[2] for item in record.mechanism.joints if item[0] == bearing.joint)
+        load = {
+            "columns": pair(f"reaction.{bearing.joint}"),
+            "sign": -1 if first == bearing.inner_body else 1,
+            "share": place.get(f"{bearing.path}.share"),
+            "count": place.get(f"{bearing.path}.count"),
+        }
+    return {
+        "cage": record.manifest.bearings.index(bearing),
+        "pitch": place[f"{bearing.path}.pitch_diameter"],
+        "ball": place[f"{bearing.path}.ball_diameter"],
+        "clearance": place[f"{bearing.path}.clearance"],
+        "force": [column[f"{force}[{k + 1}]"] for k in range(bearing.balls)],
+        "inner": pair(own("inner")),
+        "outer": pair(own("outer")),
+        "load": load,
+    }

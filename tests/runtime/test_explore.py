@@ -1,0 +1,216 @@
+"""The page with the solver in it gives the numbers of native runs, in a real browser, and asks for nothing."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import Page, needs_browser, opened
+from typer.testing import CliRunner
+
+from ballpass.derive import shipped_scenes
+from ballpass.runtime import Model
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.explore import scene_units
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot import explore
+from ballpass.runtime.plot.explore import explore_page
+from ballpass.runtime.plot.sliders import sliders
+
+needs_compiler = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
+
+DONE = "typeof current !== 'undefined' && !busy && current !== null"
+
+
+def shown(page: Page) -> dict[str, float]:
+    """Results that the page shows, with all their digits."""
+    page.wait(DONE)
+    rows = page.value("[...document.querySelectorAll('[data-result]')].map((x) => [x.dataset.result, x.dataset.value])")
+    return {name: float(value) for name, value in rows}
+
+
+def peak_ball_force(model: Model, name: str = "ball.force", **run: Any) -> float:
+    """Of the steady part of a native run [N]."""
+    return model.refine_peak(model.simulate(**run).steady(), name).value
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> Model:
+    return make_model("punching_press")
+
+
+@pytest.fixture(scope="module")
+def page(press: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    units = scene_units(shipped_scenes()["press"], press.manifest)
+    return press.explore(tmp_path_factory.mktemp("page") / "explore.html", units=units)
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Page]:
+    with opened(tmp_path / "home") as one:
+        yield one
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+def test_keys_on_a_slider_give_the_native_run_and_no_request_leaves(press: Model, page: Path, browser: Page) -> None:
+    browser.open(page)
+    own = shown(browser)
+    assert own["peak_ball_force"] == pytest.approx(peak_ball_force(press), rel=1e-6)
+    row = "document.querySelector('[data-name=\"bearing.clearance\"]')"
+    browser.value(f"{row}.querySelector('input[type=range]').focus()")
+    browser.press("ArrowRight", 5)
+    field = f"Number({row}.querySelector('input[type=number]').value)"
+    browser.wait(f"{field} > 10.9")
+    moved, clearance = shown(browser), browser.value(field)
+    numbers = {"bearing.clearance": clearance * 1e-6}
+    assert moved["peak_ball_force"] != own["peak_ball_force"]
+    assert moved["peak_ball_force"] == pytest.approx(peak_ball_force(press, parameters=numbers), rel=1e-6)
+    assert browser.value("decodeURIComponent(location.hash)") == f"#bearing.clearance={clearance:g}+um"
+    assert browser.value("lines()") == [f'--set bearing.clearance="{clearance:g} um"']
+    assert browser.asked == [page.as_uri()]
+    assert not browser.complaints
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+def test_a_link_carries_values_and_a_fault_stands_in_the_words_of_the_solver(
+    press: Model, page: Path, browser: Page
+) -> None:
+    numbers = {"bearing.clearance": 25e-6, "bearing.damping.ratio": 1e-5 * 1e-3**0.5, "mechanism.driver.speed": 40.0}
+    speed = 40.0 * 30.0 / np.pi
+    place = f"bearing.clearance=25 um&bearing.damping.ratio=1e-5 s*mm^0.5&mechanism.driver.speed={speed!r} rpm"
+    browser.open(page, f"#{place}")
+    browser.wait(f"{DONE} && current !== scene")
+    found = shown(browser)
+    solution = press.simulate(parameters=numbers)
+    steady = solution.steady()
+    assert found["peak_ball_force"] == pytest.approx(press.refine_peak(steady, "ball.force").value, rel=1e-6)
+    assert found["peak_torque"] == pytest.approx(press.refine_peak(steady, "drive_torque").value, rel=1e-6)
+    work = press.quantities(["drive_work"], parameters=numbers)["drive_work"].value
+    assert found["drive_work"] == pytest.approx(work, rel=1e-5)
+    # rms of the highest of all balls: by trapezoids on the native samples, which do not know of the load's jumps
+    highest = np.max(steady["ball.force"], axis=1)
+    assert found["rms_ball_force"] == pytest.approx(float(np.sqrt(np.mean(highest**2))), rel=2e-3)
+    # what the pictures show is that run
+    for name, column in (("inner.x", 0), ("inner.y", 1)):
+        signal = browser.value(f"all(data.bearings[0].inner[{column}])")
+        native = 1e6 * (steady[name] - steady[name.replace("inner", "outer")])[-2001:]
+        assert np.max(np.abs(np.max(native) - np.max(signal))) < 1e-2
+    browser.value("change(isNumber.get('bearing.pitch_diameter'), 1e-3)")
+    browser.wait("!get('fault').hidden")
+    fault = browser.value("get('fault').textContent")
+    assert re.search(r"bearing.pitch_diameter: 0.001 was given. Allowed: a number above 2\.61312593 times", fault)
+    browser.value("change(isNumber.get('bearing.contact.poisson_ratio'), 0.9)")
+    browser.wait("get('fault').textContent.includes('bearing.contact.poisson_ratio: 0.9 was given. Allowed')")
+    browser.value("get('reset').click()")
+    browser.wait(f"{DONE} && get('fault').hidden")
+    assert shown(browser)["peak_ball_force"] == pytest.approx(peak_ball_force(press), rel=1e-6)
+    assert not browser.complaints
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "bearing"),
+    [
+        ("rotor", ""),
+        ("punching_press_motor", ""),
+        ("punching_press_hinges", "pin."),
+        *(
+            pytest.param(scene, bearing, marks=pytest.mark.extreme)
+            for scene, bearing in (("four_bar", ""), ("punching_press_two_way", ""), ("toggle_press", "knee."))
+        ),
+    ],
+)
+def test_pages_of_other_machines_give_native_peaks_and_positions(
+    make_model: Callable[..., Model], browser: Page, tmp_path: Path, scene: str, bearing: str
+) -> None:
+    model = make_model(scene)
+    browser.open(model.explore(tmp_path / "page.html"))
+    found = shown(browser)
+    solution = model.simulate()
+    peak = model.refine_peak(solution.steady(), f"{bearing}ball.force").value
+    assert found[f"{bearing}peak_ball_force"] == pytest.approx(peak, rel=1e-6)
+    # positions, forces and angles as the page brings them of the native run, before its own solver has run
+    own = browser.value("({ brought: numbers, solved: data })")
+    for path in _signals(own["brought"]):
+        native, solved = (_at(own[kind], path) for kind in ("brought", "solved"))
+        most = np.max(np.abs(native))
+        assert np.ptp(native) == pytest.approx(np.ptp(solved), abs=2e-3 * most + 1e-9), path
+    assert not browser.complaints
+
+
+def _signals(numbers: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    if isinstance(numbers, dict):
+        if "decimals" in numbers:
+            yield path
+        else:
+            for name, value in numbers.items():
+                if name != "solver":
+                    yield from _signals(value, (*path, name))
+    elif isinstance(numbers, list):
+        for k, value in enumerate(numbers):
+            yield from _signals(value, (*path, k))
+
+
+def _at(numbers: Any, path: tuple[Any, ...]) -> np.ndarray:
+    for key in path:
+        numbers = numbers[key]
+    return np.array(numbers["values"]) / 10.0 ** numbers["decimals"]
+
+
+def test_page_needs_nothing_but_itself(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explore, "web_assembly", lambda _: b"\0asm")
+    text = explore_page(press, press.simulate(cycles=2, transient=1))
+    assert set(re.findall(r"\w+://[^\s\"'`)]*", text)) == {"http://www.w3.org/2000/svg"}  # a name, never fetched
+    assert "default-src 'none'" in text
+    assert not re.search(r"""(src|href)=(?!"data:,")|@import|url\(|fetch\(|XMLHttp|import\(""", text)
+    assert text.count("</script>") == 2
+    assert "/*" not in re.sub(r"/\* .*? \*/", "", text)  # every mark is filled
+
+
+def test_sliders_hold_the_value_stay_within_bounds_and_begin_with_clearance(press: Model) -> None:
+    manifest = press.manifest
+    values = {info.name: info.default for info in manifest.parameters}
+    rows = sliders(manifest, values, {"bearing.clearance": "um"})
+    for row, info in zip(rows, manifest.parameters, strict=True):
+        assert row["low"] < row["high"]
+        assert row["low"] <= row["value"] <= row["high"], row
+        assert info.above is None or row["low"] > info.above
+        assert info.least is None or row["low"] >= info.least
+        assert info.most is None or row["high"] <= info.most
+    first = sorted((row["first"], row["name"], row["unit"]) for row in rows if row["first"] is not None)
+    assert first[0][1:] == ("bearing.clearance", "um")
+    assert first[1][1:] == ("bearing.damping.ratio", "s*mm^0.5")
+    assert {row["name"]: row["low"] for row in rows}["bearing.clearance"] == pytest.approx(-10e-6)
+
+
+def test_units_are_those_of_the_scene_file(press: Model) -> None:
+    units = scene_units(shipped_scenes()["press"], press.manifest)
+    assert units["bearing.clearance"] == "um"
+    assert units["mechanism.driver.speed"] == "rpm"
+    assert units["mechanism.forces.punch.force.y"] == "N"
+    assert units["mechanism.bodies.rod.inertia"] == "kg*mm^2"
+    assert "bearing.share" not in units
+
+
+def test_a_missing_compiler_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, press: Model) -> None:
+    real = importlib.util.find_spec
+    missing = ("ziglang",)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *more: None if name in missing else real(name, *more))
+    with pytest.raises(RequestError, match=r'ziglang, which is not installed.*pip install "ballpass\[compiler\]"'):
+        press.explore(tmp_path / "page.html")
+    asked = ["explore", str(shipped_scenes()["press"]), "--out", str(tmp_path / "out")]
+    answer = CliRunner().invoke(app, asked)
+    assert answer.exit_code == 2
+    assert "ballpass[compiler]" in answer.stderr
+    assert not list(tmp_path.iterdir())
