@@ -1,7 +1,7 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
 Every picture is a figure of ``ballpass run SCENE`` or ``ballpass life SCENE``, copied to
-``docs/images/<scene>_<figure>.png``, but that of waviness, which is of ``ballpass spectrum`` as the how-to calls it.
+``docs/images/<scene>_<figure>.png``, but those of `SPECTRA` and `ANSWERS`, which are of commands as the how-to calls them.
 """
 
 from __future__ import annotations
@@ -44,6 +44,14 @@ SPECTRA = {
     ),
 }
 
+
+#: Figures of questions: the command's words, and the name of the figure that becomes ``docs/images/<name>.png``.
+ANSWERS = {
+    "steady_branches": (
+        ("steady", "varying_compliance.toml", "--over", "shaft.speed=1940 rpm:1990 rpm"),
+        "branches",
+    ),
+}
 
 #: Keys of the press's bearing that a designation gives.
 OWN = ("balls", "ball_diameter", "pitch_diameter", "inner_groove_radius", "outer_groove_radius", "young_modulus")
@@ -98,6 +106,16 @@ def main() -> None:
             ballpass = Path(sys.executable).parent / "ballpass"
             run([ballpass, "spectrum", scene_file, "--of", "inner.ay", *words, "--out", folder], cwd=folder, check=True)
             shutil.copyfile(Path(folder) / "spectrum.png", IMAGES / f"spectrum_{name}.png")
+    draw_answers()
+
+
+def draw_answers() -> None:
+    """Figures of questions."""
+    ballpass = Path(sys.executable).parent / "ballpass"
+    for name, ((question, scene, *words), figure) in ANSWERS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            run([ballpass, question, ROOT / "scenes" / scene, *words, "--out", folder], cwd=folder, check=True)
+            shutil.copyfile(Path(folder) / f"{figure}.png", IMAGES / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""One Newton step towards a periodic orbit: multipliers by the loss of volume, quadratic convergence, refusals."""
+"""Periodic states: numbers of an independent solver, differences of a tight flow, brute force, refusals."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from ballpass.runtime.app.cli import app
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "varying_compliance.toml"
 
-#: Time from ball to ball on the load line [s], and what preloads all balls, so that the equations are smooth.
-PERIOD, PRELOAD = 0.05, {"bearing.clearance": -20e-6}
+#: Time from ball to ball on the load line [s], and speeds [rad/s].
+PERIOD, RPM = 0.05, math.tau / 60.0
+
+#: Pitch diameter at which the cage makes three of eight turns in one of the shaft [m].
+THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 
 
 @pytest.fixture(scope="module")
@@ -25,38 +28,148 @@ def rotor(make_model: Callable[..., Model]) -> Model:
     return make_model("varying_compliance")
 
 
-@pytest.fixture(scope="module")
-def turns(rotor: Model) -> float:
-    return PERIOD * rotor.parameters["shaft.speed"] / math.tau
+def test_varying_compliance_has_the_state_and_multipliers_of_an_independent_solver(rotor: Model) -> None:
+    found = rotor.steady()
+    assert found.period == pytest.approx(PERIOD, rel=1e-12)
+    assert "renumbered by 1" in found.forcing
+    assert len(found.left) <= 6
+    assert found.start[:2] == pytest.approx([3.9935867208e-6, 6.860837e-10], rel=1e-6, abs=1e-15)
+    assert found.start[2:] == pytest.approx([-1.439634e-8, -2.0469226e-5], abs=1e-13)
+    first, second = -0.775690017 + 0.069538893j, 0.048261392 + 0.777303993j
+    for printed in (first, second):
+        for m in (printed, printed.conjugate()):
+            assert np.min(np.abs(found.multipliers - m)) < 2e-9
+    assert found.kind == "stable"
 
 
-def test_multipliers_have_the_product_that_damping_leaves_of_volume(rotor: Model, turns: float) -> None:
+def test_multipliers_have_the_product_that_damping_leaves_of_volume(rotor: Model) -> None:
     """Liouville: the divergence of the equations is -c/m for each of two velocities, wherever the balls stand."""
-    found = rotor.steady(turns)
     loss = 2.0 * rotor.parameters["bearing.inner_ring.damping"] / rotor.parameters["bearing.inner_ring.mass"]
-    assert np.prod(found.multipliers) == pytest.approx(math.exp(-loss * PERIOD), rel=1e-9)
-    assert found.difference < 1e-6
+    assert np.prod(rotor.steady().multipliers) == pytest.approx(math.exp(-loss * PERIOD), rel=1e-9)
 
 
-def test_a_step_leaves_an_error_of_higher_order_than_its_distance(rotor: Model, turns: float) -> None:
-    names = rotor.manifest.initial
-    orbit = rotor.steady(turns, parameters=PRELOAD)
-    for _ in range(2):
-        orbit = rotor.steady(turns, parameters={**PRELOAD, **dict(zip(names, orbit.start, strict=True))})
-    assert np.max(np.abs(orbit.after[:2])) < 1e-13
-    left = []
-    for away in (1e-6, 1e-7):
-        moved = orbit.start + np.array([away, 0.0, 0.0, 0.0])
-        step = rotor.steady(turns, parameters={**PRELOAD, **dict(zip(names, moved, strict=True))})
-        assert abs(step.before[0]) > 0.5 * away
-        left.append(abs(step.after[0]))
-    assert left[1] < left[0] / 90.0
+def test_multipliers_are_those_of_differences_of_a_tight_flow(rotor: Model) -> None:
+    found, steps = rotor.steady(), np.array([1e-9, 1e-9, 3e-7, 3e-7])
+    columns = []
+    for k, step in enumerate(steps):
+        ends = []
+        for side in (1.0, -1.0, 0.5, -0.5):
+            start = found.start.copy()
+            start[k] += side * step
+            ends.append(rotor.simulate(duration=PERIOD, initial=start, rtol=1e-12, outputs=[]).x[-1])
+        rough, fine = (ends[0] - ends[1]) / (2.0 * step), (ends[2] - ends[3]) / step
+        columns.append((4.0 * fine - rough) / 3.0)
+    differences = np.linalg.eigvals(np.column_stack(columns))
+    for m in found.multipliers:
+        assert np.min(np.abs(differences - m)) < 1e-6
 
 
-def test_turns_after_which_the_balls_are_elsewhere_are_warned_of(rotor: Model, turns: float) -> None:
+def test_states_in_one_and_in_several_segments_are_the_same(rotor: Model) -> None:
+    one, several = rotor.steady(), rotor.steady(segments=5)
+    assert several.segments == 5
+    assert several.start == pytest.approx(one.start, abs=1e-12)
+    assert np.abs(several.multipliers) == pytest.approx(np.abs(one.multipliers), rel=1e-7)
+
+
+def test_beyond_the_doubling_the_state_is_unstable_and_twice_its_period_is_what_runs_end_on(rotor: Model) -> None:
+    speed = {"shaft.speed": 1965.0 * RPM}
+    single, twice = (rotor.steady(repeats=n, parameters=speed) for n in (1, 2))
+    assert not single.stable
+    assert "period doubling" in single.kind
+    assert single.multipliers[0] == pytest.approx(-1.00719457, abs=1e-6)
+    assert twice.stable
+    assert twice.sooner == 2
+    times = np.arange(1196, 1200) * single.period  # distances fall by a factor of 0.97 each second period
+    run = rotor.simulate(duration=1200 * single.period, times=times, parameters=speed, outputs=[], rtol=1e-9)
+    assert np.ptp(run.x[::2, 1]) < 1e-11
+    assert abs(run.x[0, 1] - run.x[1, 1]) > 1e-8  # two values by turns, of which one is at the start
+    assert np.min(np.abs(run.x[:2] - twice.start)[:, 1]) < 1e-11
+
+
+def test_the_doubling_is_where_an_independent_solver_has_it_and_its_branch_is_followed(rotor: Model) -> None:
+    found = rotor.steady(over="shaft.speed=1955 rpm:1972 rpm")
+    base, twice = found.branches
+    assert [point.kind for point in base.special] == ["period doubling", "period doubling"]
+    assert base.special[0].value / RPM == pytest.approx(1961.14639, abs=2e-5)
+    assert twice.repeats == 2
+    assert all(point.stable for point in twice.points)
+    assert "meets the branch" in twice.ended
+    text = str(found)
+    assert "1961.146" in text and "period doubling" in text
+
+
+def test_a_fold_is_where_runs_leave_the_branch(rotor: Model) -> None:
+    (branch,) = rotor.steady(over="shaft.speed=5920 rpm:5950 rpm").branches
+    (fold,) = branch.special
+    assert fold.kind == "fold"
+    assert not branch.points[-1].stable
+    went = []
+    for away in (0.999, 1.001):
+        speed = {"shaft.speed": away * fold.value}
+        period = PERIOD * rotor.parameters["shaft.speed"] / speed["shaft.speed"]
+        run = rotor.simulate(
+            duration=400 * period,
+            times=np.arange(395, 400) * period,
+            parameters=speed,
+            initial=fold.nodes[0],
+            outputs=[],
+        )
+        went.append(float(np.max(np.abs(run.x[:, 0] - fold.nodes[0, 0]))) / abs(fold.nodes[0, 0]))
+    assert went[0] < 0.1 < 0.3 < went[1]
+
+
+def test_a_turn_is_a_period_of_the_press_whose_cage_makes_three_eighths(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press_tangent")
+    found = press.steady(parameters=THREE_EIGHTHS)
+    assert found.turns == 1.0
+    assert "renumbered by 3" in found.forcing
+    assert found.stable
+    run = press.simulate(cycles=6, parameters=THREE_EIGHTHS, outputs=[], rtol=1e-10)
+    assert run.x[-1] == pytest.approx(found.start, abs=1e-9)
+
+
+@pytest.mark.long
+def test_the_press_of_the_paper_repeats_after_134_turns(make_model: Callable[..., Model]) -> None:
+    found = make_model("punching_press_tangent").steady(parameters={"bearing.clearance": 20e-6})
+    assert found.turns == 134.0
+    assert math.log(abs(found.multipliers[0])) / 134.0 == pytest.approx(-1.7588, abs=5e-4)
+
+
+@pytest.mark.long
+def test_a_ball_that_differs_takes_whole_turns_of_the_cage(make_model: Callable[..., Model]) -> None:
+    table = '\n[bearing.ball_deviation]\n1 = "2 um"\n'
+    rotor = make_model("varying_compliance", ("[bearing.contact]", f"{table}[bearing.contact]"))
+    assert rotor.steady(transient=8.0).period == pytest.approx(8.0 * PERIOD, rel=1e-12)
+
+
+def test_what_has_no_common_period_is_refused_with_fractions_nearby(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press_tangent")
+    with pytest.raises(RequestError, match=r"two periods.*Near: "):
+        press.steady(parameters={"bearing.pitch_diameter": math.pi * 1e-2})
+    with pytest.raises(RequestError, match="no period holds between"):
+        press.steady(over="bearing.pitch_diameter=31.75 mm:33.5 mm")
+
+
+def test_turns_after_which_the_balls_are_elsewhere_are_warned_of(rotor: Model) -> None:
+    turns = PERIOD * rotor.parameters["shaft.speed"] / math.tau
     assert rotor.steady(turns).report().warnings == []
     (warning,) = rotor.steady(0.9 * turns).report().warnings
     assert "no period" in warning
+
+
+@pytest.mark.parametrize(
+    ("over", "words"),
+    [
+        ("shaft.speed", "is no range"),
+        ("shaft.sped=1 rpm:2 rpm", "shaft.speed"),
+        ("shaft.speed=1 mm:2 mm", "speed"),
+        ("shaft.speed=5 rpm:5 rpm", "two ends that differ"),
+        ("bearing.inner_ring.mass=-1 kg:1 kg", "beyond its bounds"),
+    ],
+)
+def test_ranges_are_refused(rotor: Model, over: str, words: str) -> None:
+    with pytest.raises(RequestError, match=words):
+        rotor.steady(over=over)
 
 
 def test_a_driver_whose_motion_is_a_state_is_refused(make_model: Callable[..., Model]) -> None:
@@ -64,20 +177,18 @@ def test_a_driver_whose_motion_is_a_state_is_refused(make_model: Callable[..., M
         make_model("punching_press_motor").steady()
 
 
-def test_the_command_prints_what_the_call_gives(
-    rotor: Model, turns: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_prints_what_the_call_gives(rotor: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    words = ["steady", str(SCENE), "--turns", repr(turns)]
-    done = CliRunner().invoke(app, [*words, "--json"])
+    words = ["steady", str(SCENE)]
+    done = CliRunner().invoke(app, [*words, "--json", "--out", "figures"])
     assert done.exit_code == 0, done.output
-    plain, found = json.loads(done.stdout), rotor.steady(turns)
-    assert [row["after"] for row in plain["states"]] == pytest.approx(found.after.tolist(), rel=1e-6, abs=1e-18)
-    assert [row["magnitude"] for row in plain["multipliers"]] == pytest.approx(np.abs(found.multipliers).tolist())
+    plain, found = json.loads(done.stdout), rotor.steady()
+    assert [row["start"] for row in plain["states"]] == pytest.approx(found.start.tolist(), rel=1e-6, abs=1e-15)
+    assert plain["multipliers"][0]["magnitude"] == pytest.approx(0.778800783, abs=1e-8)
+    assert (tmp_path / "figures" / "multipliers.png").exists()
     told = CliRunner().invoke(app, words)
-    assert "multipliers, magnitudes: 0.7788" in told.stdout
-    assert "One step only" in told.stdout
-    assert CliRunner().invoke(app, [*words[:3], "0"]).exit_code == 2
+    assert "(size 0.7788007" in told.stdout
+    assert CliRunner().invoke(app, [*words, "--turns", "0"]).exit_code == 2
 
 
 @pytest.mark.parametrize(

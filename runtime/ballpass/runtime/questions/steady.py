@@ -1,10 +1,11 @@
-"""A step towards the periodic orbit of a machine: one Newton iteration of shooting, and the orbit's multipliers."""
+"""Periodic states of a machine: shooting, multipliers and what they say, branches over a parameter."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -13,105 +14,286 @@ from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.show.progress import Progress
+from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
-#: Difference of the accelerations at one state, at both ends of the period, that a period of few digits has [1].
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.continuation import SteadyBranch
+    from ballpass.runtime.ask.forcing_period import ForcingPeriod
+    from ballpass.runtime.ask.parameter_range import ParameterRange
+    from ballpass.runtime.ask.shooting import PeriodicState, Shooting
+    from ballpass.runtime.run.solution import Solution
+
+#: Difference of the accelerations at one state, a period apart, that a period of few digits has [1].
 SAME = 1e-3
 
+#: A state repeats sooner where that changes it by less, in shares of the magnitudes [1].
+REPEATS = 1e-6
+
+#: A multiplier is on the unit circle within this [1].
+ON_CIRCLE = 1e-6
+
+#: Segments where one fails; kicks along the direction that doubles the period, in shares of the magnitudes.
+SEGMENTS, KICKS = 8, (1e-3, 1e-2, 0.03, 0.1, 0.3)
+
+#: Moments at which the equations are compared.
+MOMENTS = 40
+
+#: Tolerance of branches [1].
+BRANCH_RTOL = 1e-9
+
 Turns = Annotated[
-    float,
-    Option(words="Period of the orbit, in turns; loads and balls must be where they were then.", shown="N", above=0.0),
+    float | None,
+    Option(
+        words="Period of the equations, in turns of driver or shaft. Found from what turns if not given.",
+        shown="N",
+        above=0.0,
+    ),
+]
+Repeats = Annotated[
+    int, Option(words="Periods of the equations after which the state must be there again.", shown="N", least=1)
+]
+Segments = Annotated[
+    int | None,
+    Option(
+        words="Segments of multiple shooting. One if not given, and eight where that does not converge.",
+        shown="N",
+        least=1,
+        most=200,
+    ),
+]
+Before = Annotated[float, Option(words="Turns to simulate before Newton's iteration begins.", shown="N", least=0.0)]
+Over = Annotated[
+    str | None,
+    Option(
+        words="Follow the state over a parameter, from the first end of the range to the second.",
+        shown="PATH=A:B",
+        example='bearing.clearance="5 um:15 um"',
+    ),
 ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class SteadyStep(ShortRepr, Reported):
-    """One Newton iteration towards an orbit that repeats after some turns.
+class SteadyState(ShortRepr, Reported):
+    """A state that repeats after a period, and what becomes of states beside it.
 
     Attributes
     ----------
     states, units : names and SI units
-    turns : period
-    start : state at t = 0 after the step, shape (states,)
-    before, after : what a period changes in the state, from the scene's start and from that after the step, same shape
+    period : after which the state is there again [s]
+    turns : the same in turns of driver or shaft, NaN where nothing turns [1]
+    forcing : what happens in a period of the equations
+    repeats : periods of the equations in it
+    sooner : after so many of them it is there again; `repeats` where there is no such
+    start : state at t = 0, shape (states,)
     multipliers : eigenvalues of the derivative of the state after a period by that at the start, largest first
     resolution : size below which a multiplier is not known from zero
-    difference : of the accelerations at the ends of the period, at one state, relative to them [1]
+    left : what a period changed before each iteration and after the last one, in shares of the states' magnitudes [1]
+    segments : of multiple shooting
+    integrated : periods that the iterations integrated, with tangents
+    difference : of the accelerations a period apart, at one state, relative to them [1]
+    over : the range of the branches' parameter, None for none
+    branches : of states over that parameter; that of `start` first, then those of twice the period
+    notes : what was not found
 
     Examples
     --------
     >>> pitch = {"bearing.pitch_diameter": 31.75e-3}  # cage ratio 3/8
     >>> found = model.steady(parameters=pitch)
-    >>> len(found.multipliers), bool(abs(found.multipliers[0]) < 1.0)
-    (8, True)
+    >>> found.stable, found.turns, len(found.left) <= 6
+    (True, 1.0, True)
     """
 
     states: tuple[str, ...]
     units: tuple[str, ...]
+    period: float
     turns: float
+    forcing: str
+    repeats: int
+    sooner: int
     start: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
     multipliers: np.ndarray
     resolution: float
+    left: tuple[float, ...]
+    segments: int
+    integrated: int
     difference: float
+    over: ParameterRange | None
+    branches: tuple[SteadyBranch, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Whether states beside it come back to it.
+
+        Examples
+        --------
+        >>> model.steady(parameters={"bearing.pitch_diameter": 31.75e-3}).stable
+        True
+        """
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def kind(self) -> str:
+        """Stability in words: what kind of instability it is.
+
+        Examples
+        --------
+        >>> model.steady(parameters={"bearing.pitch_diameter": 31.75e-3}).kind
+        'stable'
+        """
+        return kind_of(self.multipliers)
 
     def _report(self) -> Report:
-        residuals = [
-            {"state": name, "unit": unit, "start": start, "before": before, "after": after}
-            for name, unit, start, before, after in zip(
-                self.states, self.units, self.start.tolist(), self.before.tolist(), self.after.tolist(), strict=True
-            )
+        rows = [
+            {"state": name, "unit": unit, "start": start}
+            for name, unit, start in zip(self.states, self.units, self.start.tolist(), strict=True)
         ]
-        changes = ReportTable(
-            title=f"What {self.turns:g} turns change, before and after one Newton step",
-            heads=("state", "start after", "before", "after", "unit"),
-            rows=[
-                (row["state"], f"{row['start']:z.6g}", f"{row['before']:z.3g}", f"{row['after']:z.3g}", row["unit"])
-                for row in residuals
-            ],
-            right=("start after", "before", "after"),
+        turns = "" if math.isnan(self.turns) else f", {self.turns:.10g} turns"
+        table = ReportTable(
+            title=f"State at t = 0 that repeats after {self.period:.10g} s{turns}",
+            heads=("state", "start", "unit"),
+            rows=[(row["state"], f"{row['start']:z.10g}", row["unit"]) for row in rows],
+            right=("start",),
         )
-        sizes = np.abs(self.multipliers)
-        known = [f"{size:.4g}" for size in sizes if size > self.resolution]
-        known += [f"{len(sizes) - len(known)} below {self.resolution:.0e}"] if len(known) < len(sizes) else []
-        notes = [
-            f"multipliers, magnitudes: {', '.join(known)}",
-            "One step only. Where the change after it is not small against the one before, this is no orbit yet, and "
-            "the multipliers are those of the motion from the scene's start.",
+        known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
+        lost = len(self.multipliers) - len(known)
+        told = ", ".join(_complex(m) for m in known if m.imag >= 0.0)
+        told += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
+        parts: list[str | ReportTable] = [
+            f"{self.forcing}.",
+            table,
+            f"multipliers: {told}",
+            f"{self.kind}; Newton's iteration left {', '.join(f'{left:.1e}' for left in self.left)} of the magnitudes; "
+            f"{self.integrated} periods integrated, in {self.segments} segment{'s' if self.segments > 1 else ''}",
         ]
-        warnings = []
+        if self.sooner < self.repeats:
+            parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")
+        if self.over is not None:
+            parts.append(self._points(self.over))
+            parts += [
+                f"branch of period {branch.repeats}: {len(branch.points)} points, ends {branch.ended}"
+                for branch in self.branches
+            ]
+        warnings = [*self.notes]
         if self.difference > SAME:
             warnings.append(
                 f"{self.turns:g} turns are no period of this machine: at one state the accelerations at both ends "
-                f"differ by {100.0 * self.difference:.2g} %. Loads or balls are elsewhere. Take other turns."
+                f"differ by {100.0 * self.difference:.2g} %. Loads or balls are elsewhere. Leave turns away."
             )
         facts = {
+            "period": self.period,
             "turns": self.turns,
-            "states": residuals,
-            "multipliers": [
-                {"real": m.real, "imaginary": m.imag, "magnitude": abs(m)} for m in self.multipliers.tolist()
-            ],
+            "forcing": self.forcing,
+            "repeats": self.repeats,
+            "sooner": self.sooner,
+            "states": rows,
+            "multipliers": [_plain(m) for m in self.multipliers.tolist()],
             "resolution": self.resolution,
+            "stable": self.stable,
+            "kind": self.kind,
+            "left": list(self.left),
+            "segments": self.segments,
+            "integrated": self.integrated,
             "difference": self.difference,
-            "iterations": 1,
+            "over": self.over.name if self.over else None,
+            "over_unit": self.over.unit if self.over else None,
+            "branches": [
+                {
+                    "repeats": branch.repeats,
+                    "ended": branch.ended,
+                    "points": [
+                        {
+                            "value": point.value,
+                            "kind": point.kind,
+                            "stable": point.stable,
+                            "start": point.nodes[0].tolist(),
+                            "multipliers": [_plain(m) for m in point.multipliers.tolist()],
+                        }
+                        for point in branch.points
+                    ],
+                }
+                for branch in self.branches
+            ],
         }
-        return Report(parts=(changes, *notes), facts=facts, records=residuals, index=("state",), warnings=warnings)
+        return Report(parts=parts, facts=facts, records=rows, index=("state",), warnings=warnings)
+
+    def _points(self, over: ParameterRange) -> ReportTable:
+        """Ends of the branches and the points at which the kind of the states changes."""
+        rows = []
+        for branch in self.branches:
+            ends = (branch.points[0], *branch.special, branch.points[-1])
+            for k, point in enumerate(ends):
+                what = point.kind or ("first point" if k == 0 else "last point")
+                rows.append(
+                    (
+                        str(branch.repeats),
+                        f"{point.value / over.factor:.9g}",
+                        what,
+                        _complex(complex(point.multipliers[0])),
+                    )
+                )
+        return ReportTable(
+            title=f"Branches over {over.name}",
+            heads=("period", f"value, {over.shown_unit}", "what", "largest multiplier"),
+            rows=rows,
+            right=("period", f"value, {over.shown_unit}", "largest multiplier"),
+        )
 
 
-@Question(stage="simulate")
+def kind_of(multipliers: np.ndarray) -> str:
+    """Stability in words."""
+    out = [m for m in multipliers.tolist() if abs(m) > 1.0 + ON_CIRCLE]
+    on = [m for m in multipliers.tolist() if abs(abs(m) - 1.0) <= ON_CIRCLE]
+    if on:
+        names = {"fold or branch point": 1.0, "period doubling": -1.0}
+        near = [name for name, place in names.items() if any(abs(m - place) <= ON_CIRCLE for m in on)]
+        return f"at a bifurcation: {' and '.join(near) or 'Neimark-Sacker point'}"
+    if not out:
+        return "stable"
+    kinds = {
+        "a real multiplier above 1, as behind a fold": any(not m.imag and m.real > 0.0 for m in out),
+        "a real multiplier below -1, as behind a period doubling": any(not m.imag and m.real < 0.0 for m in out),
+        "a complex pair outside the unit circle, as behind a Neimark-Sacker point": any(m.imag for m in out),
+    }
+    return f"unstable: {'; '.join(words for words, holds in kinds.items() if holds)}"
+
+
+def _complex(m: complex) -> str:
+    return f"{m.real:.9g} ± {abs(m.imag):.9g} i (size {abs(m):.9g})" if m.imag else f"{m.real:.9g}"
+
+
+def _plain(m: complex) -> dict[str, float]:
+    return {"real": m.real, "imaginary": m.imag, "magnitude": abs(m)}
+
+
+def _figures(_model: AnyModel, found: SteadyState, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.branches import draw_branches, draw_multipliers
+
+    yield "multipliers", draw_multipliers(found.multipliers, f"Multipliers: {found.kind.partition(':')[0]}")
+    if found.over is not None:
+        yield "branches", draw_branches(found.branches, found.over, found.states[0], found.units[0])
+
+
+@Question(stage="simulate", figures=_figures)
 def steady(
     model: AnyModel,
-    turns: Turns = 1.0,
+    turns: Turns = None,
     *,
+    repeats: Repeats = 1,
+    segments: Segments = None,
+    transient: Before = 1.0,
+    over: Over = None,
     parameters: Mapping[str, float] | None = None,
     rtol: TightRtol = None,
     progress: Progress = None,
-) -> SteadyStep:
-    """One Newton iteration of shooting towards the orbit that repeats after some turns, and its multipliers.
+) -> SteadyState:
+    """Find a periodic state by shooting, and say by its multipliers whether it is stable.
 
-    Starts from the scene's initial state. Further iterations are left to the caller: give `start` as the initial state.
+    With `over` the state is followed over a parameter: folds, period doublings and Neimark-Sacker points are located,
+    and branches of twice the period followed. Unstable states are found as well as stable ones.
 
     Parameters
     ----------
@@ -121,9 +303,10 @@ def steady(
     Raises
     ------
     RequestError
-        A scene without states, or one whose driver's motion is a state.
+        A scene without states, one whose driver's motion is a state, one in which what turns has no common period, or
+        a law whose force jumps.
     SimulationError
-        A multiplier is 1, so that no step is defined, or the computation failed.
+        Newton's iteration does not converge, or the computation failed.
 
     Examples
     --------
@@ -132,42 +315,187 @@ def steady(
     >>> found.states[0], found.start.shape
     ('inner.x', (8,))
     """
+    from ballpass.runtime.ask.forcing_period import forcing_period
+    from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
-    from ballpass.runtime.point.evaluate import point
+    from ballpass.runtime.run.locating import refuse_jumps
 
     manifest = model.manifest
-    names, mechanism = manifest.initial, manifest.mechanism
-    if not names or (mechanism is not None and mechanism.angle):
-        why = "the driver's motion is a state" if names else "nothing is integrated"
+    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
+        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
         raise RequestError(f"steady: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
-    numbers = model.numbers(parameters)
-    begin = np.array([numbers.values[name] for name in names])
-    found = model.sensitivities(names, turns, parameters=parameters, rtol=rtol, samples_per_cycle=2, progress=progress)
-    monodromy, before = found.x[-1], found.solution.x[-1] - begin
-    try:
-        start = begin - np.linalg.solve(monodromy - np.eye(len(begin)), before)
-    except np.linalg.LinAlgError:
-        raise SimulationError(
-            "steady: a multiplier is 1, the orbit is one of many, and no step is defined. Add damping or a load."
-        ) from None
-    run = model.simulate(
-        turns,
-        parameters={**(parameters or {}), **dict(zip(names, start.tolist(), strict=True))},
-        rtol=found.solution.statistics.rtol,
-        samples_per_cycle=2,
-        outputs=[],
-        transient=0.0,
-    )
-    rates = [np.array(model.kernel("rhs")(point(model, numbers, t, run.x[-1]))) for t in (run.t[0], run.t[-1])]
-    multipliers = np.linalg.eigvals(monodromy)
-    return SteadyStep(
+    refuse_jumps(manifest, "steady")
+    ends = None if over is None else parameter_range(manifest, "over", over)
+    given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
+    numbers = model.numbers(given)
+    turn = model.period(given)
+    with shown("shooting", progress) as tell:
+        sampled = _transient(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
+        pick = np.linspace(0, len(sampled.t) - 1, MOMENTS).astype(int)
+        period = forcing_period(model, numbers, sampled.t[pick], sampled.x[pick], turns)
+        length = period.time(numbers.values)
+        if ends is not None:
+            _same_structure(model, {**given, ends.name: ends.high}, sampled, pick, period, turns)
+        shooting = Shooting(
+            model=model,
+            parameters=given,
+            period=period,
+            repeats=repeats,
+            segments=segments or 1,
+            magnitude=np.array(sampled.statistics.magnitudes),
+            rtol=BRANCH_RTOL if rtol is None and ends is not None else rtol,
+            over=ends.name if ends else "",
+        )
+        whole = math.floor(transient * turn / length + 1e-9) if math.isfinite(turn) else 0
+        begin = _begin(model, given, whole * length)
+        found, shooting = _solved(shooting, begin, fixed=segments is not None)
+        sooner = _sooner(shooting, found)
+        if sooner == 1 < repeats and repeats % 2 == 0:
+            kicked = _kicked(shooting, found)
+            found, sooner = (found, sooner) if kicked is None else (kicked, _sooner(shooting, kicked))
+        branches, notes = ((), ()) if ends is None else _branches(shooting, found, (ends.low, ends.high), tell)
+    return SteadyState(
         states=tuple(info.name for info in manifest.states),
         units=tuple(info.unit for info in manifest.states),
-        turns=turns,
-        start=start,
-        before=before,
-        after=run.x[-1] - start,
-        multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
-        resolution=SENSITIVITY * found.solution.statistics.rtol,
-        difference=float(np.max(np.abs(rates[1] - rates[0])) / max(float(np.max(np.abs(rates))), 1e-300)),
+        period=repeats * length,
+        turns=repeats * length / turn if math.isfinite(turn) else math.nan,
+        forcing=period.words,
+        repeats=repeats,
+        sooner=sooner,
+        start=found.nodes[0],
+        multipliers=found.multipliers,
+        resolution=SENSITIVITY * sampled.statistics.rtol,
+        left=found.left,
+        segments=shooting.segments,
+        integrated=found.periods,
+        difference=period.difference,
+        over=ends,
+        branches=branches,
+        notes=notes,
     )
+
+
+def _transient(model: AnyModel, parameters: Mapping[str, float], duration: float, samples: int) -> Solution:
+    """A run from the scene's start, without outputs."""
+    found: Solution = model.simulate(
+        duration=duration,
+        parameters=parameters,
+        times=np.linspace(0.0, duration, samples + 1),
+        outputs=[],
+        transient=0.0,
+        progress=False,
+    )
+    return found
+
+
+def _begin(model: AnyModel, parameters: Mapping[str, float], duration: float) -> np.ndarray:
+    """State after whole periods, shape (states,); the scene's where there are none."""
+    if duration > 0.0:
+        return np.asarray(_transient(model, parameters, duration, 1).x[-1])
+    numbers = model.numbers(parameters)
+    return np.array([numbers.values[name] for name in model.manifest.initial])
+
+
+def _nodes(shooting: Shooting, start: np.ndarray) -> np.ndarray:
+    """States at the starts of the segments along a run, shape (segments, states)."""
+    if shooting.segments == 1:
+        return start[None, :]
+    model: AnyModel = shooting.model
+    length = shooting.repeats * shooting.period.time(model.numbers(shooting.parameters).values)
+    run = model.simulate(
+        duration=length,
+        parameters=shooting.parameters,
+        initial=start,
+        times=np.arange(shooting.segments) * length / shooting.segments,
+        outputs=[],
+        transient=0.0,
+        progress=False,
+    )
+    return np.asarray(run.x)
+
+
+def _solved(shooting: Shooting, begin: np.ndarray, *, fixed: bool) -> tuple[PeriodicState, Shooting]:
+    """The state, in more segments where one fails and none were asked for."""
+    value = shooting.parameters[shooting.over] if shooting.over else None
+    try:
+        return shooting.solve(_nodes(shooting, begin), value), shooting
+    except SimulationError:
+        if fixed:
+            raise
+    several = replace(shooting, segments=SEGMENTS)
+    return several.solve(_nodes(several, begin), value), several
+
+
+def _sooner(shooting: Shooting, found: PeriodicState) -> int:
+    """Periods of the equations after which the state is there again: a divisor of those that were asked for."""
+    value = shooting.parameters[shooting.over] if shooting.over else None
+    for periods in range(1, shooting.repeats):
+        if shooting.repeats % periods == 0:
+            part = replace(shooting, repeats=periods, segments=1)
+            if part.residual(found.nodes[:1], value).size < REPEATS:
+                return periods
+    return shooting.repeats
+
+
+def _kicked(shooting: Shooting, found: PeriodicState) -> PeriodicState | None:
+    """A state of twice the period beside an unstable one, sought along the direction that doubles it."""
+    value = shooting.parameters[shooting.over] if shooting.over else None
+    single = replace(shooting, repeats=1, segments=1)
+    values, vectors = np.linalg.eig(single.residual(found.nodes[:1], value).monodromy)
+    flip = int(np.argmin(np.abs(values + np.abs(values))))
+    if values[flip].real > -1.0:
+        return None
+    along = np.real(vectors[:, flip])
+    along *= 1.0 / np.max(np.abs(along / shooting.magnitude))
+    for kick in KICKS:
+        try:
+            other = shooting.solve(_nodes(shooting, found.nodes[0] + kick * along), value)
+        except SimulationError:
+            continue
+        if _sooner(shooting, other) == shooting.repeats:
+            return other
+    return None
+
+
+def _same_structure(
+    model: AnyModel,
+    parameters: Mapping[str, float],
+    sampled: Solution,
+    pick: np.ndarray,
+    period: ForcingPeriod,
+    turns: float | None,
+) -> None:
+    """Refuse a range over which the period is not that of the same turns."""
+    from ballpass.runtime.ask.forcing_period import forcing_period
+
+    other = forcing_period(model, model.numbers(parameters), sampled.t[pick], sampled.x[pick], turns)
+    if (other.rate, other.count) != (period.rate, period.count):
+        raise RequestError(
+            f"over: at its first end {period.words}, at its second {other.words}: no period holds between. Allowed: "
+            "parameters that leave the ratio of the speeds as it is."
+        )
+
+
+def _branches(
+    shooting: Shooting, found: PeriodicState, ends: tuple[float, float], tell: Callable[[float], None] | None
+) -> tuple[tuple[SteadyBranch, ...], tuple[str, ...]]:
+    """The branch of a state, and those of twice the period at its doublings, each once."""
+    from ballpass.runtime.ask.continuation import LARGEST_STEP, doubled, follow
+
+    first = follow(shooting, found, ends[0], ends, progress=tell)
+    branches, notes, met = [first], [], list[float]()
+    if not first.ended.startswith("at the end"):
+        notes.append(f"The branch ends {first.ended}, and does not reach the end of the range.")
+    for point in first.special:
+        near = LARGEST_STEP * abs(ends[1] - ends[0])
+        if point.kind != "period doubling" or any(abs(point.value - other) < near for other in met):
+            continue
+        try:
+            branches.append(doubled(shooting, point, ends))
+        except SimulationError as error:
+            notes.append(f"The branch of twice the period at {point.value:.6g} was not followed: {error}")
+            continue
+        if branches[-1].ended.startswith("where it meets"):
+            met.append(branches[-1].points[-1].value)
+    return tuple(branches), tuple(notes)

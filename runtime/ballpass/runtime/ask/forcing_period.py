@@ -1,0 +1,190 @@
+"""After which time the equations of a model are the same again, found from what turns in them.
+
+In: a model, its numbers, states of a motion.  Out: a `ForcingPeriod`.
+
+Each phase that the equations depend on turns at its own rate.  Balls are alike, so that a cage need turn by whole ball
+pitches only: a ball then stands where another stood.  Whether that holds, for one ball may differ from the others, is
+seen from the accelerations at one state, now and a period later.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.run import driver_angle
+
+#: Two rates are commensurable where a fraction with at most this denominator meets their ratio so closely [1].
+LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
+
+#: Accelerations at one state a period apart, relative to the largest, that are the same [1].
+SAME = 1e-6
+
+#: Change of a phase that shows whether the equations depend on it [rad].
+NUDGE = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForcingPeriod:
+    """A period of the equations.
+
+    Attributes
+    ----------
+    rate : parameter or constant, the rate of what fixes the period [rad/s]
+    count : turns of it in a period; a fraction where balls take each other's places
+    words : what happens in a period
+    difference : of the accelerations at one state a period apart, relative to the largest [1]
+    """
+
+    rate: str
+    count: Fraction | float
+    words: str
+    difference: float
+
+    def time(self, values: Mapping[str, float]) -> float:
+        """The period for these numbers of the model [s]."""
+        return float(self.count) * driver_angle.TURN / abs(values[self.rate])
+
+
+def forcing_period(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, turns: float | None
+) -> ForcingPeriod:
+    """Find the shortest period of the equations, or check the one that is asked for.
+
+    Parameters
+    ----------
+    times, states : moments of a motion, at which the equations are compared, shapes (moments,), (moments, states) [s]
+    turns : the period that is asked for, of driver or shaft; None: find it
+
+    Raises
+    ------
+    RequestError
+        What turns has no common period, or nothing changes with time.
+    """
+    if turns is not None:
+        speed = driver_angle.speed_name(model.manifest)
+        if speed is None or numbers.values[speed] == 0.0:
+            raise RequestError("turns: nothing turns in this scene. Leave it away.")
+        asked = ForcingPeriod(rate=speed, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
+        return _checked(model, numbers, times, states, asked)
+    rates = _rates(model, numbers, times, states)
+    if not rates:
+        raise RequestError(
+            "steady: the equations do not change with time, so that they have no period. Look for a rest: "
+            "ballpass linearize."
+        )
+    (base, order), *others = rates.items()
+    ratios = {name: abs(numbers.values[name]) * n / (abs(numbers.values[base]) * order) for name, n in others}
+    near = {name: Fraction(ratio).limit_denominator(LARGEST_DENOMINATOR) for name, ratio in ratios.items()}
+    for name, ratio in ratios.items():
+        if abs(near[name] - ratio) > EXACT * ratio:
+            raise RequestError(_two_periods(base, name, ratio * order / rates[name]))
+    whole = math.lcm(*(one.denominator for one in near.values()))
+    # one ball that differs, or rings whose shapes turn with the balls, need more than a ball pitch
+    for several in range(1, max(rates.values()) + 1):
+        count = Fraction(whole * several, order)
+        words = "; ".join(
+            _turned(name, count * (near[name] * order / n if name in near else 1), n) for name, n in rates.items()
+        )
+        found = _checked(
+            model, numbers, times, states, ForcingPeriod(rate=base, count=count, words=words, difference=0.0)
+        )
+        if found.difference <= SAME:
+            return found
+    raise RequestError(
+        f"steady: no period was found: after {float(count):g} turns of {base} the accelerations at one state differ by "
+        f"{100.0 * found.difference:.2g} %. Give the period yourself: turns."
+    )
+
+
+def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
+    """Rates that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls."""
+    found: dict[str, int] = {}
+    for k, item in enumerate(model.manifest.inputs):
+        if (item.times and not item.rate) or (item.kind == "gate" and item.times):
+            raise RequestError(
+                f"steady: {item.name} follows a table over time, which has no period. Allowed: loads and speeds that "
+                "are constant or turn evenly."
+            )
+        if item.rate and numbers.values[item.rate] != 0.0 and _matters(model, numbers, times, states, k, item):
+            found.setdefault(item.rate, _alike(model, item.rate))
+    speed = driver_angle.speed_name(model.manifest)
+    return dict(sorted(found.items(), key=lambda one: one[0] != speed))
+
+
+def _alike(model: LoadedModel, rate: str) -> int:
+    """Into how many parts that look alike a turn of a rate falls: the balls of the bearing whose cage it turns."""
+    for bearing in model.manifest.bearings:
+        if rate in (
+            f"{bearing.path}.cage_speed",
+            f"{bearing.path}.inner_pass_speed",
+            f"{bearing.path}.outer_pass_speed",
+        ):
+            return bearing.balls
+    return 1
+
+
+def _matters(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, row: int, item: InputInfo
+) -> bool:
+    """Whether the equations depend on an input at any of the moments."""
+    if item.kind != "phase":
+        return True
+    rhs = model.kernel("rhs")
+    for t, x in zip(times.tolist(), states, strict=True):
+        there = point(model, numbers, t, x)
+        before = np.array(rhs(there))
+        moved = np.array(there["u"])
+        moved[row] += NUDGE
+        if not np.array_equal(before, np.array(rhs({**there, "u": moved}))):
+            return True
+    return False
+
+
+def _checked(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, period: ForcingPeriod
+) -> ForcingPeriod:
+    """The period with the difference that it leaves between accelerations at one state."""
+    rhs, length = model.kernel("rhs"), period.time(numbers.values)
+    first, later = (
+        np.array(
+            [np.array(rhs(point(model, numbers, t + after, x))) for t, x in zip(times.tolist(), states, strict=True)]
+        )
+        for after in (0.0, length)
+    )
+    largest = max(float(np.max(np.abs(first))), 1e-300)
+    difference = float(np.max(np.abs(later - first))) / largest
+    return ForcingPeriod(rate=period.rate, count=period.count, words=period.words, difference=difference)
+
+
+def _turned(name: str, turns: Fraction, alike: int) -> str:
+    if alike > 1 and turns.denominator > 1:
+        pitches = turns * alike
+        return f"{name} turns by {_count(pitches, 'ball pitch', 'ball pitches')}, balls renumbered by {pitches % alike}"
+    return f"{name} makes {_count(turns, 'turn', 'turns')}"
+
+
+def _count(number: Fraction, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _two_periods(base: str, name: str, ratio: float) -> str:
+    near = ", ".join(
+        f"{one} (off by {abs(float(one) - ratio):.1e})"
+        for one in dict.fromkeys(Fraction(ratio).limit_denominator(most) for most in (20, 200, 2000))
+    )
+    return (
+        f"steady: {name} turns {ratio:.12g} times as fast as {base}, which is no fraction with a denominator up to "
+        f"{LARGEST_DENOMINATOR}: the motion has two periods, and no state repeats. Near: {near}. Change a diameter so "
+        "that it is one, give the period that is near enough: turns; or take statistics: ballpass run --turns settle, "
+        "or the stroboscopic values of ballpass bifurcation."
+    )

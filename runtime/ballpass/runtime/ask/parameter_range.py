@@ -1,0 +1,97 @@
+"""A range of one parameter as questions take it: ``bearing.clearance=0um:40um``, or with a count behind it.
+
+In: a manifest and text.  Out: a `ParameterRange`, SI, within the parameter's bounds.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.bounds import allowed as bounds_text
+from ballpass.runtime.contract.bounds import outside
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
+
+#: The number of a quantity; what stands behind it is its unit.
+_NUMBER = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?")
+
+#: Most values of a range.
+MOST = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterRange:
+    """Values of a parameter from one end to the other.
+
+    Attributes
+    ----------
+    name, unit, words : of the parameter
+    low, high : ends as they were written, SI
+    count : of values; 0 where none was asked for
+    shown_unit, factor : the unit that the first end was written in, and its size in `unit`
+    """
+
+    name: str
+    unit: str
+    words: str
+    low: float
+    high: float
+    count: int = 0
+    shown_unit: str = ""
+    factor: float = 1.0
+
+
+def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool = False) -> ParameterRange:
+    """Read a range.
+
+    Parameters
+    ----------
+    option : what the caller calls it, for messages
+    counted : whether a count of values belongs to it
+
+    Raises
+    ------
+    RequestError
+        Another form, an unknown parameter, a wrong unit, or ends that are equal or out of bounds.
+    """
+    shape = "PATH=A:B:N" if counted else "PATH=A:B"
+    example = 'bearing.clearance="5 um:40 um' + (':80"' if counted else '"')
+    path, equals, written = (part.strip() for part in text.partition("="))
+    parts = [part.strip() for part in written.split(":")]
+    if not equals or len(parts) != (3 if counted else 2):
+        raise RequestError(f"{option}: {text!r:.80} is no range. Allowed: {shape}, as in {example}.")
+    infos = {info.name: info for info in manifest.parameters}
+    if path not in infos:
+        raise RequestError(f"{option}: {unknown_name('parameter', path, infos)}")
+    info = infos[path]
+    try:
+        low, high = (parse_quantity(end, info.unit) for end in parts[:2])
+    except QuantityError as error:
+        raise RequestError(f"{option} {path}: {error}") from None
+    if low == high:
+        raise RequestError(f"{option} {path}: both ends are {parts[0]}. Allowed: two ends that differ.")
+    if outside(info, np.array([low, high])).any():
+        raise RequestError(f"{option} {path}: {written} goes beyond its bounds. Allowed: numbers {bounds_text(info)}.")
+    count = 0
+    if counted:
+        if not parts[2].isdecimal() or not 2 <= int(parts[2][:9]) <= MOST:
+            raise RequestError(
+                f"{option} {path}: {parts[2]!r:.40} is no count. Allowed: whole numbers from 2 to {MOST}."
+            )
+        count = int(parts[2])
+    shown = _NUMBER.sub("", parts[0], count=1).strip() or "1"
+    return ParameterRange(
+        name=path,
+        unit=info.unit,
+        words=info.description,
+        low=low,
+        high=high,
+        count=count,
+        shown_unit=shown,
+        factor=parse_quantity(f"1 {shown}", info.unit) if shown != "1" else 1.0,
+    )

@@ -1,0 +1,220 @@
+"""Periodic states by shooting: Newton on what a period changes in the state, with the stepper's own tangents.
+
+In: a model, a period, states to start from.  Out: `PeriodicState`.
+
+A period falls into segments of equal time.  Unknown are the states at their starts; what must vanish is the state at
+the end of each less the start of the next.  One segment is single shooting; more keep a motion that repels from leaving
+its neighbourhood within a period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.ask.forcing_period import ForcingPeriod
+from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.directions import Chain
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.sensitivity import sensitivities
+from ballpass.runtime.run.start import RunEnd
+
+#: Most iterations, and halvings of a step that does not lessen what is left.
+ITERATIONS, HALVINGS = 20, 5
+
+#: Done where a step is below this share of the magnitudes, or what is left is [1].
+CLOSE = 1e-9
+
+#: Tolerance of the iterations until they are this close; the last ones have the tight one.
+ROUGH, NEAR = 1e-8, 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Residual:
+    """What a period leaves, in shares of the states' magnitudes, and its derivatives.
+
+    Attributes
+    ----------
+    left : shape (unknowns,)
+    by_states : shape (unknowns, unknowns)
+    by_parameter : by the varied parameter, shape (unknowns,) [1/unit]; zero without one
+    monodromy : derivative of the state after a period by that at its start, SI, shape (states, states)
+    """
+
+    left: np.ndarray
+    by_states: np.ndarray
+    by_parameter: np.ndarray
+    monodromy: np.ndarray
+
+    @property
+    def size(self) -> float:
+        return float(np.max(np.abs(self.left)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PeriodicState:
+    """A state that repeats.
+
+    Attributes
+    ----------
+    nodes : states at the starts of the segments, the first at t = 0, shape (segments, states)
+    monodromy : derivative of the state after all periods by that at the start, shape (states, states)
+    multipliers : its eigenvalues, largest first
+    left : what is left, for each iteration, in shares of the states' magnitudes [1]
+    periods : integrated in all, with tangents
+    """
+
+    nodes: np.ndarray
+    monodromy: np.ndarray
+    multipliers: np.ndarray
+    left: tuple[float, ...]
+    periods: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shooting:
+    """What shooting needs of a model.
+
+    Attributes
+    ----------
+    model : the model
+    parameters : overrides, SI
+    period : of the equations
+    repeats : periods after which the state must be there again
+    segments : into which this time falls
+    magnitude : of each state, shape (states,)
+    rtol : of the runs; None: that of derivatives
+    over : parameter that varies, "" for none
+    """
+
+    model: LoadedModel
+    parameters: Mapping[str, float]
+    period: ForcingPeriod
+    repeats: int
+    segments: int
+    magnitude: np.ndarray
+    rtol: float | None
+    over: str = ""
+
+    def numbers(self, value: float | None) -> Numbers:
+        """Numbers of the model with this value of the varied parameter."""
+        given = dict(self.parameters) if value is None else {**self.parameters, self.over: value}
+        return self.model.numbers(given)
+
+    def residual(self, nodes: np.ndarray, value: float | None = None, rtol: float | None = None) -> Residual:
+        """What a period leaves from these states at the segments' starts, shape (segments, states).
+
+        Raises
+        ------
+        IntegrationError
+            A run failed.
+        """
+        model, count = self.model, nodes.shape[1]
+        numbers = self.numbers(value)
+        length = self.repeats * self.period.time(numbers.values)
+        names = [*model.manifest.initial, *([self.over] if self.over else [])]
+        later = 0.0
+        if self.over:  # where the period is a function of the parameter, so are the ends of all segments
+            chain = Chain(model, numbers, [self.over])
+            later = -length * float(chain.derivative(self.period.rate)[0]) / numbers.values[self.period.rate]
+        left = np.empty_like(nodes)
+        by_parameter = np.zeros_like(nodes)
+        by_states = np.zeros((self.segments, count, self.segments, count))
+        monodromy = np.eye(count)
+        states = tuple(info.name for info in model.manifest.states)
+        for k in range(self.segments):
+            begin = RunEnd(
+                time=k * length / self.segments, x=nodes[k].copy(), states=states, parameters=numbers.parameters
+            )
+            request = Request(
+                duration=length / self.segments,
+                initial=begin,
+                samples_per_cycle=1,
+                outputs=[],
+                rtol=self.rtol if rtol is None else rtol,
+            )
+            found = sensitivities(model, numbers, request, names)
+            end, slopes = found.solution.x[-1], found.x[-1]
+            flow, nxt = slopes[:, :count], (k + 1) % self.segments
+            left[k] = (end - nodes[nxt]) / self.magnitude
+            by_states[k, :, k] += flow * self.magnitude / self.magnitude[:, None]
+            by_states[k, :, nxt] -= np.eye(count)
+            if self.over:
+                ends = [(k + j) * length / self.segments for j in (0, 1)]
+                rates = [
+                    _rate(model, numbers, t, x, inside)
+                    for t, x, inside in zip(ends, (nodes[k], end), (1.0, -1.0), strict=True)
+                ]
+                shift = [(k + j) / self.segments * later for j in (0, 1)]
+                moved = slopes[:, count] + rates[1] * shift[1] - flow @ rates[0] * shift[0]
+                by_parameter[k] = moved / self.magnitude
+            monodromy = flow @ monodromy
+        size = nodes.size
+        return Residual(
+            left=left.ravel(),
+            by_states=by_states.reshape(size, size),
+            by_parameter=by_parameter.ravel(),
+            monodromy=monodromy,
+        )
+
+    def solve(self, nodes: np.ndarray, value: float | None = None) -> PeriodicState:
+        """Newton's iteration from these states, with shorter steps where a whole one lessens nothing.
+
+        Raises
+        ------
+        SimulationError
+            It does not converge, a multiplier is 1, or a run failed.
+        """
+        rough = ROUGH if self.rtol is None else max(self.rtol, ROUGH)
+        tight = self.rtol is not None and self.rtol >= ROUGH
+        close = max(CLOSE, 10.0 * (self.rtol or 0.0))  # a run is no more exact than its tolerance
+        now = self.residual(nodes, value, rough)
+        left, runs = [now.size], 1
+        for _ in range(ITERATIONS):
+            try:
+                step = -np.linalg.solve(now.by_states, now.left).reshape(nodes.shape) * self.magnitude
+            except np.linalg.LinAlgError:
+                raise SimulationError(
+                    "steady: a multiplier is 1, the state is one of many, and no step is defined. Add damping or a "
+                    "load."
+                ) from None
+            share, small = 1.0, float(np.max(np.abs(step / self.magnitude)))
+            tight = tight or small < NEAR
+            for _ in range(HALVINGS):
+                then = self.residual(nodes + share * step, value, None if tight else rough)
+                runs += 1
+                if then.size < now.size or small < NEAR:
+                    break
+                share /= 2.0
+            else:
+                break
+            nodes, now = nodes + share * step, then
+            left.append(now.size)
+            if tight and (small < close or now.size < close):
+                multipliers = np.linalg.eigvals(now.monodromy)
+                return PeriodicState(
+                    nodes=nodes,
+                    monodromy=now.monodromy,
+                    multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
+                    left=tuple(left),
+                    periods=runs * self.repeats,
+                )
+        raise SimulationError(
+            f"steady: Newton's iteration ended at a change of {left[-1]:.2g} of the states' magnitudes in a period "
+            f"(begun at {left[0]:.2g}). Take a longer transient, more segments, or another start; chaotic motion has "
+            "no state nearby that repeats."
+        )
+
+
+def _rate(model: LoadedModel, numbers: Numbers, t: float, x: np.ndarray, side: float) -> np.ndarray:
+    """Derivative of the state by time, just behind (side above 0) or just before a time at which a load may switch."""
+    aside = t + side * 1e-9 * max(t, 1e-9 * driver_angle.TURN)
+    there = point(model, numbers, t, x)
+    there["u"] = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t, aside)
+    return np.array(model.kernel("rhs")(there))
