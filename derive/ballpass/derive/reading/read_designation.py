@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.scene.bearing_records import Catalogue
-from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
+from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.table import Table, listing, suggest
-from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+from ballpass.derive.scene.units import show
 
 #: Bearing steel of rings and balls, where a designation gives the geometry.
 YOUNG_MODULUS, POISSON_RATIO = "207 GPa", 0.3
@@ -38,7 +39,7 @@ def fill_by_designation(table: Table) -> Catalogue | None:
             filled["clearance"] = f"{Decimal(sum(span)) / 2} um"
         given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
         table.data = filled | given
-        _fill_contact(table)
+        _fill_contact(table, kind)
     catalogue = read_record(
         Catalogue,
         table,
@@ -91,21 +92,11 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
     return ""
 
 
-def _fill_contact(table: Table) -> None:
-    """Grooves and steel, where the scene gives no stiffness."""
+def _fill_contact(table: Table, kind: BearingType) -> None:
+    """Steel, and what the element's contact needs, where the scene gives no stiffness."""
     contact = table.data.get("contact", {})
     if not isinstance(contact, dict) or "stiffness" in contact:
         return
-    ball = table.data["ball_diameter"]
-    own = str(ball)
-    filled: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
-    for ring, ratio in zip(("inner", "outer"), GROOVES, strict=True):
-        number, _, unit = own.partition(" ")
-        if unit == "mm" and number.replace(".", "", 1).isdigit():
-            filled[f"{ring}_groove_radius"] = f"{Decimal(number) * ratio} mm"
-            continue
-        try:
-            filled[f"{ring}_groove_radius"] = f"{parse_quantity(ball, 'm') * float(ratio)!r} m"
-        except QuantityError:  # told where the ball diameter is read
-            filled[f"{ring}_groove_radius"] = "1 m"
-    table.data = {**table.data, "contact": filled | contact}
+    steel: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+    own = ELEMENTS[kind.element].fill_contact(table.data["ball_diameter"], kind)
+    table.data = {**table.data, "contact": {**steel, **own, **contact}}

@@ -278,14 +278,15 @@ class Lubrication:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bearing:
-    """A deep groove ball bearing.
+    """A rolling bearing.
 
     `name` is empty for the scene's only ``[bearing]``; ``[bearings.<name>]`` have one.  `joint` names the revolute
     joint whose reaction loads it (None without mechanism).
     `coupling` one-way: `share` is the part of the ideal reaction it takes, `inner` what moves with the inner ring.
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
-    `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
+    `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
+    structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
     nothing of that kind.
     """
@@ -348,12 +349,13 @@ class Bearing:
     ball_angle: SceneNumber = quantity(
         "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"
     )
-    contact: HertzContact | GivenContact
+    contact: Any
     damping: Damping
     effects: tuple[BallEffect, ...]
     inner: InnerRing | None
     outer: OuterRing | None
     initial: InitialState
+    element: str = "ball"
     catalogue: Catalogue | None = None
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None

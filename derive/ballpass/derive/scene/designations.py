@@ -49,6 +49,7 @@ class BearingType:
     bore: Decimal
     outside: Decimal
     width: Decimal
+    element: str = "ball"
     balls: int
     ball_diameter: Decimal
     catalogues: tuple[CatalogueRating, ...]

@@ -24,8 +24,8 @@ ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", 
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
 BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
 
-#: Behind these for each bearing: means over its balls of powers of their loads [kN^3, kN^(10/3), kN^3].
-LOAD_POWERS = ("load.cubes", "load.ten_thirds", "load.outer_damage")
+#: Behind these for each bearing: means over its balls of powers of their loads, see `LoadPowers` of the readings.
+LOAD_POWERS = ("load.turning", "load.standing", "load.outer_damage")
 
 #: Places of a raceway.
 SECTORS = 72
@@ -64,7 +64,7 @@ class ReductionRows:
         return len(HEAD) + len(ROWS) * len(self.channels)
 
     def raceways(self, rows: np.ndarray, prefix: str) -> np.ndarray:
-        """Integrals over time of the third power of the ball loads at the places of both raceways of a bearing.
+        """Integrals over time of the first power of the ball loads at the places of both raceways of a bearing.
 
         Places are hat functions at equal distances, in the ring's own coordinates, from where its x axis was at the
         start.
@@ -72,7 +72,7 @@ class ReductionRows:
         Returns
         -------
         numpy.ndarray
-            Outer, then inner raceway [kN^3 s], shape (members, 2, SECTORS).
+            Outer, then inner raceway, loads in kN, shape (members, 2, SECTORS).
         """
         first = self._sectors + 2 * SECTORS * (self.powers.index(prefix + LOAD_POWERS[0]) // len(LOAD_POWERS))
         return rows[:, first : first + 2 * SECTORS].reshape(len(rows), 2, SECTORS)

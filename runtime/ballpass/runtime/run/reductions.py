@@ -233,7 +233,9 @@ def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> L
     """Mean powers of a bearing's ball loads from reductions, shape (members, .)."""
     layout = reduction_rows(manifest)
     duration = rows[:, HEAD.index("duration")]
-    cubes, more, damage = (rows[:, layout.column("integral", bearing.prefix + name)] / duration for name in LOAD_POWERS)
+    turning, standing, damage = (
+        rows[:, layout.column("integral", bearing.prefix + name)] / duration for name in LOAD_POWERS
+    )
     length = duration[:, None, None] * bearing.balls / SECTORS
     places = layout.raceways(rows, bearing.prefix) / length
-    return LoadPowers(cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=places)
+    return LoadPowers(turning=turning, standing=standing, outer_damage=damage, raceways=places)
