@@ -31,6 +31,7 @@ def fill_by_designation(table: Table) -> Catalogue | None:
     span = kind.clearance(group) if kind is not None and group else None
     if kind is not None:
         filled: dict[str, object] = {
+            "element": kind.element,
             "balls": kind.balls,
             "ball_diameter": f"{kind.ball_diameter} mm",
             "pitch_diameter": f"{kind.pitch_diameter} mm",
@@ -39,6 +40,7 @@ def fill_by_designation(table: Table) -> Catalogue | None:
             filled["clearance"] = f"{Decimal(sum(span)) / 2} um"
         given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
         table.data = filled | given
+        _check_element(table, kind)
         _fill_contact(table, kind)
     catalogue = read_record(
         Catalogue,
@@ -56,11 +58,13 @@ def _bearing_type(table: Table) -> BearingType:
     types = bearing_types()
     if not name or name in types:
         return types[name or "6204"]
+    others = [name for name, kind in types.items() if kind.element != "ball"]
     table.fault(
         "designation",
         "the table of bearings does not have it",
         given=show(name),
-        allowed="6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905, without suffixes",
+        allowed=", ".join(["6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905", *others])
+        + ", without suffixes",
         remedy=suggest(name, list(types), "see `ballpass bearings`, or give balls and diameters as numbers"),
     )
     return types["6204"]  # so that no fault follows from this one; what is read never leaves
@@ -93,10 +97,25 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
 
 
 def _fill_contact(table: Table, kind: BearingType) -> None:
-    """Steel, and what the element's contact needs, where the scene gives no stiffness."""
-    contact = table.data.get("contact", {})
-    if not isinstance(contact, dict) or "stiffness" in contact:
+    """What the element's contact needs, and steel; of these, what goes with a stiffness where the scene gives one."""
+    contact, element = table.data.get("contact", {}), ELEMENTS[kind.element]
+    if not isinstance(contact, dict):
         return
-    steel: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
-    own = ELEMENTS[kind.element].fill_contact(table.data["ball_diameter"], kind)
-    table.data = {**table.data, "contact": {**steel, **own, **contact}}
+    filled: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+    filled |= element.fill_contact(table.data["ball_diameter"], kind)
+    if "stiffness" in contact:
+        filled = {key: value for key, value in filled.items() if key in keys_of(element.given)}
+    table.data = {**table.data, "contact": filled | contact}
+
+
+def _check_element(table: Table, kind: BearingType) -> None:
+    given = table.data["element"]
+    if given in ELEMENTS and given != kind.element:
+        table.fault(
+            "element",
+            f"the bearing {kind.designation} has other rolling elements",
+            given=show(given),
+            allowed=show(kind.element),
+            remedy="delete the key, or the designation",
+        )
+        table.data = {**table.data, "element": kind.element}  # no second fault
