@@ -53,7 +53,8 @@ def _groove(ring: str, symbol: str, example: str) -> Any:
     )
 
 
-def _smoothing() -> Any:
+def smoothing_key() -> Any:
+    """The key of the smoothed onset of a contact."""
     hint = "The contact then acts where ball and raceway are apart: give a smaller width."
     return positive(
         "m",
@@ -79,7 +80,7 @@ class HertzContact:
     outer_groove_radius: SceneNumber = _groove("outer", "r_e", "4.206875 mm")
     ring: Material
     ball: Material | None
-    smoothing: SceneNumber | None = _smoothing()
+    smoothing: SceneNumber | None = smoothing_key()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +90,7 @@ class GivenContact:
     stiffness: SceneNumber = positive(
         "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5"
     )
-    smoothing: SceneNumber | None = _smoothing()
+    smoothing: SceneNumber | None = smoothing_key()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,8 +17,8 @@ GROOVES = (Decimal("0.52"), Decimal("0.53"))
 #: Groups of radial clearance of bearings with cylindrical bore; ISO 5753-1.  It is the diametral clearance P_d: the way
 #: of one ring from one side to the other.  Their ranges are in ``clearances.csv``.
 GROUPS = ("C2", "CN", "C3", "C4", "C5")
-#: Tables of bearings, and the rolling elements of those in it.
-TABLES = {"deep_groove.csv": "ball"}
+#: The usual bearings: their table comes first, and says nothing of their element.
+FIRST = "deep_groove.csv"
 MAKERS = ("nsk", "koyo", "skf")
 
 
@@ -68,10 +68,12 @@ def _rows(table: str) -> list[dict[str, str]]:
 @cache
 def bearing_types() -> dict[str, BearingType]:
     """All bearings of the tables by designation, in their order."""
-    return {row["designation"]: _bearing_type(row, element) for t, element in TABLES.items() for row in _rows(t)}
+    names = (path.name for path in files("ballpass.derive.scene").iterdir() if path.name.endswith(".csv"))
+    rows = (row for name in sorted(names, key=lambda name: (name != FIRST, name)) for row in _rows(name))
+    return {row["designation"]: _bearing_type(row) for row in rows if "designation" in row}
 
 
-def _bearing_type(row: dict[str, str], element: str) -> BearingType:
+def _bearing_type(row: dict[str, str]) -> BearingType:
     bore, outside = Decimal(row["bore"]), Decimal(row["outside"])
     catalogues = []
     for maker in MAKERS:
@@ -87,7 +89,7 @@ def _bearing_type(row: dict[str, str], element: str) -> BearingType:
             )
     return BearingType(
         designation=row["designation"],
-        element=element,
+        element=row.get("element", "ball"),
         bore=bore,
         outside=outside,
         width=Decimal(row["width"]),
