@@ -117,6 +117,7 @@ def _bearing(
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
     return BearingStrength(
         name=info.name,
+        element=info.element,
         dynamic_rating=float(ratings.dynamic),
         static_rating=float(ratings.static),
         fatigue_limit=float(ratings.fatigue_limit),

@@ -185,16 +185,19 @@ static inline void bp_add_places(double *restrict sectors, double ball, double a
     }
 }
 
-/* The same for all balls of a bearing, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart. */
-static inline void bp_add_sectors(double *restrict sectors, int balls, double h, const double *restrict of, const double *restrict from,
-                                  const double *restrict to)
+/* The same for all balls of a bearing, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart; the first power
+   of the loads is p/q. */
+static inline __attribute__((always_inline)) void bp_add_sectors(double *restrict sectors, int balls, const int p, const int q, double h,
+                                                                 const double *restrict of, const double *restrict from,
+                                                                 const double *restrict to)
 {
     for (int j = 0; j < balls; j++) {
         double sum = 0.0, moment = 0.0;
         for (int i = 0; i < BP_POINTS; i++) {
             const double force = of[i * BP_BALL_QUANTITIES + j], load = force > 0.0 ? 1e-3 * force : 0.0;
-            sum += bp_boole[i] * (load * load * load);
-            moment += 0.25 * i * bp_boole[i] * (load * load * load);
+            const double power = bp_power(load, p, q);
+            sum += bp_boole[i] * power;
+            moment += 0.25 * i * bp_boole[i] * power;
         }
         if (sum > 0.0) bp_add_places(sectors, (double)j / balls, h * sum, moment / sum, from, to);
     }
@@ -584,7 +587,8 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
             bp_passes(t, x, step->n->u, step->n->p, step->n->c, end ? to : from);
         }
 #define BP_ADD(b)                                                                                                                       \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, h, of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,       \
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_##b##_TURNING, BP_##b##_TURNING_BY, h,            \
+                   of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,                                                                         \
                    from + 2 * (b), to + 2 * (b));
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD

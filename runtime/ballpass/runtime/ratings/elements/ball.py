@@ -46,6 +46,8 @@ class RatedBall(RatedElement):
 
     name = "ball"
     noun = "ball"
+    limit_words = "C_0r/22"
+    contact_words = "ellipse, a x b"
     life = life.BALLS
 
     def dynamic_rating(self, geometry: ElementGeometry) -> Any:

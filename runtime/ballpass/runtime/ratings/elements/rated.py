@@ -85,11 +85,14 @@ class RatedElement(ABC):
     ----------
     name : what stands in the scene file
     noun : what one is called
+    limit_words, contact_words : where its fatigue load limit is from, and what `semi_axes` are of, in a table
     life : how its life depends on its load
     """
 
     name: ClassVar[str]
     noun: ClassVar[str]
+    limit_words: ClassVar[str]
+    contact_words: ClassVar[str]
     life: ClassVar[ElementLife]
 
     @abstractmethod
