@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_RINGS = 5, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};

@@ -19,9 +19,10 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
-from ballpass.derive.lowering.ball_kernels import CONTACT, RELATIVE, SUMS, BallKernels
+from ballpass.derive.lowering.ball_kernels import CONTACT, SUMS, BallKernels
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS
 from ballpass.derive.system import System
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import ElementLife
@@ -64,6 +65,7 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         "BP_NB": sum(b.balls for b in kernels.bearings),
         "BP_NS": SUMS * count,
         "BP_RELATIVE": RELATIVE,
+        "BP_RINGS": RINGS,
         "BP_NR": kernels.relative_size,
         "BP_NG": kernels.slopes,
         "BP_LANES": LANES,

@@ -90,7 +90,7 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
     for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
         bp_member_##b##_##kernel##_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                       \
         for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
         for (int m = 0; m < (slopes); m++)                                                                                       \
@@ -172,7 +172,7 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
 #define BP_CHANNEL(b)                                                                                                            \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
         bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
