@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.drive.laws import LAWS as DRIVES
 from ballpass.derive.mechanism.dyads import DYADS
@@ -26,6 +27,7 @@ def kind_of_force(table: str, pathway: type, law: type) -> str:
 
 REGISTERED: Mapping[str, set[str]] = {
     "damping law": set(LAWS),
+    "rolling element": set(ELEMENTS),
     "effect": set(EFFECTS),
     "drive": set(DRIVES),
     "force": {kind_of_force(t.key, pathway, law) for t in FORCE_TABLES for pathway in t.pathways for law in t.laws},
@@ -109,6 +111,33 @@ def _laws() -> list[Part]:
                 )
             )
     return found
+
+
+# rolling elements, on the rotor of varying compliance, which a tangent law makes feel their slopes
+
+_GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
+_STEEL = 'young_modulus = "207 GPa"\npoisson_ratio = 0.3'
+ELEMENT_CONTACTS = {
+    "ball": f'inner_groove_radius = "4.1275 mm"\nouter_groove_radius = "4.206875 mm"\n{_STEEL}',
+    "cylindrical-roller": f'length = "8 mm"\n{_STEEL}',
+}
+
+
+def _elements() -> list[Part]:
+    return [
+        Part(
+            registry="rolling element",
+            name=name,
+            text=shipped(
+                "varying_compliance",
+                ("[bearing]\n", f'[bearing]\nelement = "{name}"\n'),
+                (_GIVEN, contact),
+                ('law = "none"', 'law = "tangent"\nratio = "0.25e-5 s"'),
+            ),
+            docs=("theory/rollers.md", f"`{name}`"),
+        )
+        for name, contact in ELEMENT_CONTACTS.items()
+    ]
 
 
 # effects on the balls, on the rotor of varying compliance
@@ -316,4 +345,4 @@ def _dyads() -> list[Part]:
     ]
 
 
-PARTS: tuple[Part, ...] = (*_laws(), *_effects(), *_drives(), *_forces(), *_dyads())
+PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads())

@@ -52,7 +52,7 @@ def test_every_law_has_a_formula() -> None:
 
 def parts_of(law: str, *, contact: bool = False, rate: bool = False) -> tuple[sp.Expr, sp.Expr]:
     """Elastic and damping force of one ball, smoothed over the deflection, over the rate."""
-    touch = Contact(stiffness=STIFFNESS, width=WIDTH if contact else None)
+    touch = Contact(stiffness=STIFFNESS, exponent=sp.Rational(3, 2), width=WIDTH if contact else None)
     rest = SmoothedRest(width=RATE_WIDTH if rate else None)
     return touch.force(DELTA), LAWS[law].force(DELTA, RATE, COEFFICIENT, touch, rest)
 

@@ -20,7 +20,7 @@ from ballpass.runtime.app.commands.ranges import read_ranges
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.ratings import load_ratings, of_bearing
 
-TYPES = bearing_types()
+TYPES = {name: kind for name, kind in bearing_types().items() if kind.element == "ball"}
 #: Bearings that the table's balls miss by more than 2 %.  Of 6302 both print f_0 = 12.3, not 12.1: its pitch circle is
 #: not the mean of bore and outside diameter.  Koyo prints two digits for 618/7
 #: and 619/5, and has other balls in the rest.

@@ -44,6 +44,7 @@ TABLES = {
     "docs/howto/sensitivity.md": "test_sensitivity_table.py",
     "docs/howto/two_way.md": "test_coupling_table.py",
     "docs/theory/damping.md": "a definition",
+    "docs/theory/rollers.md": "test_cylindrical_roller.py",
     "docs/reference/scene.md": "test_keys.py, which makes the page anew",
 }
 
@@ -171,6 +172,9 @@ NAMED: dict[str, dict[str, str]] = {
         "for 64 steps": "kinks.h",
         "from 0 to 1": "a definition",
         "*SIAM J. Numer. Anal.* 35, 1998": "literature",
+    },
+    "docs/theory/rollers.md": {
+        "SKF prints 28500 N and 22000 N for an NU204, 32500 N and 27000 N for": "cylindrical_roller.csv",
     },
     "docs/theory/life.md": {
         "has 4200 MPa in": "a limit of the standard",

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.lowering.functions import lower, operations
 from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
@@ -157,7 +158,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
     yield Feature(
         name=f"ball contacts{of}",
         path=f"{bearing.path}.contact",
-        modelled=f"{bearing.balls} balls at the cage's angles, Hertz force of each",
+        modelled=f"{bearing.balls} {ELEMENTS[bearing.element].noun}s at the cage's angles, Hertz force of each",
         without=None,
     )
     if bearing.coupling == "two-way":

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import sympy as sp
 
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.bearing.stiffness import ellipse_constants
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
@@ -103,7 +103,7 @@ def ring_outputs(model: BearingModel) -> list[Output]:
 
 
 def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
-    """Hertz's contact of every ball with both raceways, under its elastic force, and its stiffness."""
+    """Contact of every ball with both raceways, under its elastic force, and its stiffness."""
     ball, names = model.ball, model.names
     of = f" of {bearing.name}" if bearing.name else ""
     force = ball.elastic_force
@@ -131,27 +131,19 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
             balls_of=names.prefix,
         )
     ]
-    for ring, constants in ellipse_constants(bearing, names).items():
-        major, minor, pressure = (c.symbol for c in constants)
-        factor = names.constant(f"k_{ring[0]}")
-        words = f"each ball's contact{of} with the {ring} ring"
-        rows = (
-            ("pressure", pressure * sp.cbrt(force), "Pa", f"Peak pressure of {words}"),
-            ("major_axis", major * sp.cbrt(force), "m", f"Half axis of the ellipse of {words}, across the groove"),
-            ("minor_axis", minor * sp.cbrt(force), "m", f"Half axis of the ellipse of {words}, along the groove"),
-            ("approach", (force / factor) ** sp.Rational(2, 3), "m", f"Approach of {words}"),
-        )
+    element = ELEMENTS[bearing.element]
+    for ring, (constants, quantities) in element.contact_quantities(bearing, names, force).items():
         out += [
             Output(
-                name=f"{names.prefix}ball.{ring}_{name}",
-                expression=sp.Piecewise((value, force > 0), (0, True)),
-                unit=unit,
-                description=text,
+                name=f"{names.prefix}ball.{ring}_{quantity.name}",
+                expression=sp.Piecewise((quantity.expression, force > 0), (0, True)),
+                unit=quantity.unit,
+                description=quantity.description.format(f"each {element.noun}'s contact{of}"),
                 per_ball=True,
                 balls_of=names.prefix,
                 constants=constants,
             )
-            for name, value, unit, text in rows
+            for quantity in quantities
         ]
     return out
 

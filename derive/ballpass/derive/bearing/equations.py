@@ -16,10 +16,10 @@ import sympy as sp
 
 from ballpass.derive.bearing.cage import Cage
 from ballpass.derive.bearing.effects import EFFECTS, GenericBall
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
-from ballpass.derive.bearing.stiffness import stiffness_constants
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
@@ -88,7 +88,7 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     """Contact of the balls; `cage` says how they turn."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
     stiffness = names.constant("k_b")
-    constants = [*stiffness_constants(bearing, names), *cage.constants]
+    constants = [*ELEMENTS[bearing.element].stiffness(bearing, names), *cage.constants]
     law = LAWS[bearing.damping.law]
     numbers = {q.path.rpartition(".")[2]: symbol_of(q) for q in bearing.damping.numbers}
     coefficient = law.coefficient(numbers, stiffness)
@@ -159,7 +159,11 @@ def _ball(
     def optional(quantity: object) -> sp.Expr | None:
         return None if quantity is None else symbol_of(quantity)  # type: ignore[arg-type]
 
-    contact = Contact(stiffness=names.constant("k_b"), width=optional(bearing.contact.smoothing))
+    contact = Contact(
+        stiffness=names.constant("k_b"),
+        exponent=ELEMENTS[bearing.element].exponent,
+        width=optional(bearing.contact.smoothing),
+    )
     rest = SmoothedRest(width=optional(bearing.damping.smoothing))
     delta, delta_rate = names.variable("ball.deflection"), names.variable("ball.deflection_rate")
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))

@@ -32,6 +32,9 @@ from ballpass.derive.terms import Smoothness
 #: A law is smooth enough where this derivative is continuous: its branches differ by a higher power of the distance.
 KINK_ORDER = 2
 
+#: Powers are multiples of one over this: of halves (balls) and ninths (rollers).
+EXPONENTS = 18.0
+
 #: Values of the quantity that does not decide, in units of what the other numbers are: far and near on both sides.
 _ELSEWHERE = (sp.Integer(-30), sp.Rational(-1, 7), sp.Rational(2, 11), sp.Integer(40))
 
@@ -235,5 +238,5 @@ def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> float:
             near, far = _beside(difference, decides, meets, side)
             if abs(near) > _ZERO:
                 power = mpmath.log(abs(far) / abs(near)) / mpmath.log(10)
-                order = min(order, round(2.0 * float(power)) / 2.0)
+                order = min(order, round(EXPONENTS * float(power)) / EXPONENTS)
     return order

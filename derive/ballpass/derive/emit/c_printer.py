@@ -8,7 +8,12 @@ this text.
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import casadi as ca
+
+#: Largest denominator of an exponent that is taken for a fraction; `driver/powers.h` has roots so high.
+HIGHEST_ROOT = 12
 
 _UNARY = {
     ca.OP_NEG: "-{0}",
@@ -94,8 +99,11 @@ def print_function(
     indent = "        " if lanes else "    "
     declared: set[int] = set()
     inverses = _shared_divisors(function)
+    exponents, silent = _fractional_exponents(function)
     for k in range(function.n_instructions()):
         operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if k in silent:
+            continue
         if operation == ca.OP_OUTPUT:
             place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
             lines.append(f"{indent}{function.name_out(out[0])}[{place}] = w{take[0]};")
@@ -110,6 +118,8 @@ def print_function(
             text = name if name in by_value else f"{name}[{place}]"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))
+        elif k in exponents:
+            text = f"bp_power(w{take[0]}, {exponents[k].numerator}, {exponents[k].denominator})"
         elif k in inverses:
             name, first = inverses[k]
             if first:
@@ -125,6 +135,29 @@ def print_function(
         declared.add(out[0])
     lines += ["    }", "}"] if lanes else ["}"]
     return "\n".join(lines)
+
+
+def _fractional_exponents(function: ca.Function) -> tuple[dict[int, Fraction], set[int]]:
+    """Exponents of powers that `bp_power` has, by instruction, and the constants that nothing else uses."""
+    made_by: dict[int, int] = {}
+    found: dict[int, Fraction] = {}
+    silent: set[int] = set()
+    used: set[int] = set()
+    for k in range(function.n_instructions()):
+        operation, take = function.instruction_id(k), function.instruction_input(k)
+        if operation in (ca.OP_POW, ca.OP_CONSTPOW):
+            held = made_by[take[1]]
+            if function.instruction_id(held) == ca.OP_CONST:
+                exponent = function.instruction_constant(held)
+                near = Fraction(exponent).limit_denominator(HIGHEST_ROOT)
+                if near.denominator > 2 and abs(float(near) - exponent) < 1e-14:
+                    found[k], take = near, take[:1]
+                    silent.add(held)
+        if operation != ca.OP_INPUT:
+            used |= {made_by[place] for place in take}
+        if operation != ca.OP_OUTPUT:
+            made_by[function.instruction_output(k)[0]] = k
+    return found, silent - used
 
 
 def _shared_divisors(function: ca.Function) -> dict[int, tuple[str, bool]]:

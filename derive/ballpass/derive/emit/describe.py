@@ -121,6 +121,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             ),
             catalogue=catalogue_info(bearing),
             lubrication=lubrication_info(bearing),
+            element=bearing.element,
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

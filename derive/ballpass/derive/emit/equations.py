@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 import sympy as sp
 
+from ballpass.derive.bearing.elements.hertz import ellipticity
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.bearing.hertz import ellipticity
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME, Definition
 from ballpass.derive.variables import Input, Parameter, State

@@ -19,10 +19,13 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
-from ballpass.derive.lowering.ball_kernels import CONTACT, RELATIVE, SUMS, BallKernels
+from ballpass.derive.lowering.ball_kernels import CONTACT, SUMS, BallKernels
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS
 from ballpass.derive.system import System
+from ballpass.runtime.ratings.elements import RATED
+from ballpass.runtime.ratings.life import ElementLife
 
 #: Stage times evaluated at once, directions differentiated along at once, members that advance together: one 512-bit
 #: vector, two of 256 bits.
@@ -47,6 +50,7 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
     """Text of kernels.h."""
     n = len(system.coordinates)
     count = len(kernels.bearings)
+    lives = [RATED[bearing.element].life for bearing in system.scene.bearings]
     sizes = {
         "BP_NQ": n,
         "BP_NX": 2 * n,
@@ -61,6 +65,7 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         "BP_NB": sum(b.balls for b in kernels.bearings),
         "BP_NS": SUMS * count,
         "BP_RELATIVE": RELATIVE,
+        "BP_RINGS": RINGS,
         "BP_NR": kernels.relative_size,
         "BP_NG": kernels.slopes,
         "BP_LANES": LANES,
@@ -77,14 +82,14 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         + "\n"
         + _integers("bp_is_angle", [int(c.kind == "angle") for c in system.coordinates]),
         "#define BP_EACH_BEARING(DO) " + " ".join(f"DO({k})" for k in range(count)),
-        *(_bearing(k, kernels.bearings) for k in range(count)),
+        *(_bearing(k, kernels.bearings, lives[k]) for k in range(count)),
         *(_single(k) for k in kernels.functions),
         *(_turned(k) for k in kernels.turned),
     ]
     return _header("KERNELS", parts)
 
 
-def _bearing(index: int, bearings: tuple[BallKernels, ...]) -> str:
+def _bearing(index: int, bearings: tuple[BallKernels, ...], life: ElementLife) -> str:
     """Sizes of a bearing, its balls' directions in the cage, and its kernels, the balls in lanes."""
     own = bearings[index]
     firsts = [0, *accumulate(b.balls for b in bearings)], [0, *accumulate(b.slopes for b in bearings)]
@@ -95,6 +100,7 @@ def _bearing(index: int, bearings: tuple[BallKernels, ...]) -> str:
         "SLOPES": own.slopes,
         "FIRST_SLOPE": firsts[1][index],
         "PARTIALS": own.partials,
+        **_load_powers(life),
     }
     angles = [sp.Rational(2 * j, own.balls) * sp.pi for j in range(own.balls)]
     name = f" of {own.prefix[:-1]}" if own.prefix else ""
@@ -116,6 +122,13 @@ def _bearing(index: int, bearings: tuple[BallKernels, ...]) -> str:
             *(_of_balls(own.over_numbers[key], index, text) for key, text in words.items()),
         ]
     )
+
+
+def _load_powers(life: ElementLife) -> dict[str, int]:
+    """Exponents of the loads that damage a turning and a standing ring, and what makes damage of the latter's mean."""
+    powers = {"TURNING": life.turning, "STANDING": life.standing, "DAMAGE": 1 / life.weibull}
+    fractions = ((name, power.numerator, power.denominator) for name, power in powers.items())
+    return {key: value for name, p, q in fractions for key, value in ((name, p), (f"{name}_BY", q))}
 
 
 def _of_balls(function: ca.Function, index: int, words: str) -> str:
@@ -296,5 +309,7 @@ def _sizes(sizes: dict[str, int]) -> str:
 
 
 def _header(name: str, parts: Iterable[str]) -> str:
-    guard = f"BALLPASS_{name}_H"
+    guard, parts = f"BALLPASS_{name}_H", [*parts]
+    if any("bp_power(" in part for part in parts):
+        parts.insert(0, '#include "powers.h"')
     return "\n\n".join([_NOTE, f"#ifndef {guard}\n#define {guard}", *parts, "#endif"]) + "\n"

@@ -31,13 +31,8 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS, relative_motion, ring_motion_slopes
 from ballpass.derive.lowering.visitor import Visitor
-
-#: Coefficients of a ball's deflection and rate, three and two, and the direction of the cage.
-RELATIVE = 7
-
-#: Those of the deflection and its rate.
-RINGS = 5
 
 #: Rows of the sums.
 SUMS = 2
@@ -95,9 +90,9 @@ class BallBuilder:
         self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
         self.relative = self._relative()
         co, si, r = self.co, self.si, self.r
-        self._rows = self._ball(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, co, si)
+        self._rows = self._ball(*relative_motion(r, co, si), co, si)
         # opposite balls share what their deflections are made of
-        along, rate = r[1] * co + r[2] * si, r[3] * co + r[4] * si
+        along, rate = relative_motion(ca.vertcat(0.0, r[1:]), co, si)
         self._pair = (
             (self._ball(r[0] + along, rate, co, si), self._ball(r[0] - along, -rate, -co, -si))
             if bearing.ball.count % 2 == 0
@@ -166,8 +161,7 @@ class BallBuilder:
     def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
         """Rows of G."""
         co, si = self.co, self.si
-        squares = (co * co, co * si, si * si)
-        rows = [f * s for f in (by_delta, by_rate) for s in squares]
+        rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
         if self.bearing.ball.own is not None:
             moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
             rows += [moved * co, moved * si]
@@ -229,29 +223,12 @@ class BallBuilder:
     def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
         """Rows of G of a ball and of the one opposite, whose direction has the other sign."""
         co, si = self.co, self.si
-        squares = (co * co, co * si, si * si)
-        rows = [(at[f] + other[f]) * s for f in ("Fd", "Fv") for s in squares]
+        both = [at[f] + other[f] for f in ("Fd", "Fv")]
+        rows = ca.vertsplit(ring_motion_slopes().summands(co, si, *both))
         if self.bearing.ball.own is not None:
             moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_acceleration"]) for b in (at, other)]
             rows += [(moved[0] - moved[1]) * co, (moved[0] - moved[1]) * si]
         return rows
-
-
-def sums_by_relative(sums: ca.SX, slopes: ca.SX, r: ca.SX) -> ca.SX:
-    """d(S)/d(r) from S and the rows of G; the column of r0 is left out: nothing that moves enters it.
-
-    The cage turns all balls at once, d(cos) = -sin, d(sin) = cos.
-    """
-    g = slopes
-    turn = ca.vertcat(
-        -r[1] * g[1] + r[2] * g[0] - r[3] * g[4] + r[4] * g[3] - sums[1],
-        -r[1] * g[2] + r[2] * g[1] - r[3] * g[5] + r[4] * g[4] + sums[0],
-    )
-    return ca.horzcat(_by_rings(g), -r[6] * turn, r[5] * turn)
-
-
-def _by_rings(g: ca.SX) -> ca.SX:
-    return ca.vertcat(ca.horzcat(0, g[0], g[1], g[3], g[4]), ca.horzcat(0, g[1], g[2], g[4], g[5]))
 
 
 def sums_by_time(slopes: ca.SX, *, own: bool) -> ca.SX:
@@ -284,7 +261,7 @@ def _sums_moved(rows: int, numbers: int) -> ca.Function:
     by_k = ca.reshape(total[rows - SUMS * numbers :], SUMS, numbers)
     angle = rows - SUMS * numbers - 2 * SUMS
     g, rings = total[SUMS:], r_d[:RINGS]
-    by_r = _by_rings(g) @ rings + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
+    by_r = ring_motion_slopes().by_coefficients(g) @ rings + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
     moved = by_r + total[angle : angle + SUMS] * a_d + by_k @ k_d
     return ca.Function("sums_moved", [total, r_d, a_d, k_d], [ca.densify(moved)], ["T", "r_d", "a_d", "k_d"], ["S_d"])
 

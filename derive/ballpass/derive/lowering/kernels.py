@@ -28,15 +28,14 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.lowering.ball_kernels import (
-    RELATIVE,
     SUMS,
     BallBuilder,
     BallKernels,
     UnfitError,
-    sums_by_relative,
     sums_by_time,
 )
 from ballpass.derive.lowering.mass_matrix import accelerations
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, ring_motion_slopes
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -158,7 +157,9 @@ class KernelBuilder:
         slopes = [g[end - size : end] for end, size in zip(ends, sizes, strict=True)]
         by_rings = ca.diagcat(
             *(
-                sums_by_relative(sums[SUMS * k : SUMS * k + SUMS], own, held[RELATIVE * k : RELATIVE * k + RELATIVE])
+                ring_motion_slopes().by_relative(
+                    sums[SUMS * k : SUMS * k + SUMS], own, held[RELATIVE * k : RELATIVE * k + RELATIVE]
+                )
                 for k, own in enumerate(slopes)
             )
         )

@@ -16,7 +16,7 @@ from operator import add, mul
 import casadi as ca
 import sympy as sp
 
-from ballpass.derive.bearing.hertz import ellipticity
+from ballpass.derive.bearing.elements.hertz import ellipticity
 from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
 from ballpass.derive.variables import DRIVER_ANGLE
 
@@ -216,6 +216,10 @@ class Visitor:
             if exponent.q == 2 and root:
                 factors.append(ca.sqrt(value))
             return reduce(mul, factors)
+        if exponent.is_Rational and exponent > 1:
+            # slopes keep a fraction below one as exponent, which C takes by roots
+            whole, rest = divmod(exponent.p, exponent.q)
+            return reduce(mul, [value] * whole) * ca.power(value, float(sp.Rational(rest, exponent.q)))
         if exponent is sp.E or base is sp.E:
             return ca.exp(self(exponent))
         return ca.power(value, self(exponent))

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.elements import ELEMENTS, RollingElement
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_cage import read_cage
 from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_uneven
@@ -19,11 +20,8 @@ from ballpass.derive.scene.bearing_records import (
     Bearing,
     Damping,
     EquivalentMass,
-    GivenContact,
-    HertzContact,
     InitialState,
     InnerRing,
-    Material,
     OuterRing,
 )
 from ballpass.derive.scene.keys import ChoiceKey, PairKey
@@ -35,11 +33,12 @@ from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.
 _NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle")
-#: What placeholders in the keys of materials stand for.
-RINGS, BALLS = {"PART": "rings", "_OF": ""}, {"PART": "balls", "_OF": "_w"}
-#: What gives the stiffness of a contact.
-_GEOMETRY = ("inner_groove_radius", "outer_groove_radius", *keys_of(Material))
-CONTACT = Either(what="the contact stiffness", groups=(("stiffness",), _GEOMETRY), at="stiffness")
+ELEMENT = ChoiceKey(
+    words="Kind of the rolling elements",
+    choices=tuple(ELEMENTS),
+    default=next(iter(ELEMENTS)),
+    note='in names of other keys and of outputs "ball" stands for either',
+)
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))
 SUPPORT = ChoiceKey(words="Support of the outer ring", choices=("elastic", "fixed"), note="fixed: nothing else")
 LAW = ChoiceKey(words="Law of the damping at a ball", choices=tuple(LAWS))
@@ -74,6 +73,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         table.know(*keys, "contact", "damping", "inner_ring", "outer_ring", "initial", "cage", *EFFECTS)
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
+        element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
         joint, share = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
@@ -93,12 +93,13 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             inner_body=inner_body,
             count=read_count(table, coupling),
             **numbers,
-            contact=_read_contact(table),
-            damping=_read_damping(table),
+            contact=element.read_contact(table),
+            damping=_read_damping(table, element),
             effects=_read_effects(table, numbers["balls"]),
             inner=_read_inner_ring(table, mechanism is not None) if coupling == "one-way" else None,
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
+            element=element.name,
             catalogue=catalogue,
             cage=read_cage(table, uneven),
             lubrication=read_lubrication(table),
@@ -155,21 +156,7 @@ def _read_place(
     return name, share
 
 
-def _read_contact(table: Table) -> HertzContact | GivenContact:
-    with table.table("contact", "groove radii and elastic constants, or stiffness") as contact:
-        contact.know(*_GEOMETRY, "ball_material", "smoothing")
-        chosen = CONTACT.choose(contact, keys_of(HertzContact) | keys_of(Material) | keys_of(GivenContact))
-        if chosen == ("stiffness",):
-            return read_record(GivenContact, contact)
-        contact.missing = contact.missing or not chosen
-        ball = None
-        if contact.has("ball_material"):
-            with contact.table("ball_material", "young_modulus and poisson_ratio") as material:
-                ball = read_record(Material, material, BALLS)
-        return read_record(HertzContact, contact, ring=read_record(Material, contact, RINGS), ball=ball)
-
-
-def _read_damping(table: Table) -> Damping:
+def _read_damping(table: Table, element: RollingElement) -> Damping:
     with table.table("damping", "law and ratio") as damping:
         name = LAW.read(damping, "law")
         if name is None:
@@ -194,7 +181,7 @@ def _read_damping(table: Table) -> Damping:
                 allowed=f"smoothing with the laws {listing(kinked)}",
                 remedy="delete the key; smoothing in [bearing.contact] smooths the contact onset",
             )
-        return read_record(Damping, damping, **known | {"numbers": law.read(damping)})
+        return read_record(Damping, damping, **known | {"numbers": law.read(damping, element.fill)})
 
 
 def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.scene.bearing_records import Catalogue
-from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
+from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.table import Table, listing, suggest
-from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+from ballpass.derive.scene.units import show
 
 #: Bearing steel of rings and balls, where a designation gives the geometry.
 YOUNG_MODULUS, POISSON_RATIO = "207 GPa", 0.3
@@ -30,6 +31,7 @@ def fill_by_designation(table: Table) -> Catalogue | None:
     span = kind.clearance(group) if kind is not None and group else None
     if kind is not None:
         filled: dict[str, object] = {
+            "element": kind.element,
             "balls": kind.balls,
             "ball_diameter": f"{kind.ball_diameter} mm",
             "pitch_diameter": f"{kind.pitch_diameter} mm",
@@ -38,7 +40,8 @@ def fill_by_designation(table: Table) -> Catalogue | None:
             filled["clearance"] = f"{Decimal(sum(span)) / 2} um"
         given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
         table.data = filled | given
-        _fill_contact(table)
+        _check_element(table, kind)
+        _fill_contact(table, kind)
     catalogue = read_record(
         Catalogue,
         table,
@@ -55,11 +58,13 @@ def _bearing_type(table: Table) -> BearingType:
     types = bearing_types()
     if not name or name in types:
         return types[name or "6204"]
+    others = [name for name, kind in types.items() if kind.element != "ball"]
     table.fault(
         "designation",
         "the table of bearings does not have it",
         given=show(name),
-        allowed="6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905, without suffixes",
+        allowed=", ".join(["6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905", *others])
+        + ", without suffixes",
         remedy=suggest(name, list(types), "see `ballpass bearings`, or give balls and diameters as numbers"),
     )
     return types["6204"]  # so that this fault causes no others; the record is never used
@@ -91,21 +96,26 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
     return ""
 
 
-def _fill_contact(table: Table) -> None:
-    """Grooves and steel, where the scene gives no stiffness."""
-    contact = table.data.get("contact", {})
-    if not isinstance(contact, dict) or "stiffness" in contact:
+def _fill_contact(table: Table, kind: BearingType) -> None:
+    """What the element's contact needs, and steel; of these, what goes with a stiffness where the scene gives one."""
+    contact, element = table.data.get("contact", {}), ELEMENTS[kind.element]
+    if not isinstance(contact, dict):
         return
-    ball = table.data["ball_diameter"]
-    own = str(ball)
     filled: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
-    for ring, ratio in zip(("inner", "outer"), GROOVES, strict=True):
-        number, _, unit = own.partition(" ")
-        if unit == "mm" and number.replace(".", "", 1).isdigit():
-            filled[f"{ring}_groove_radius"] = f"{Decimal(number) * ratio} mm"
-            continue
-        try:
-            filled[f"{ring}_groove_radius"] = f"{parse_quantity(ball, 'm') * float(ratio)!r} m"
-        except QuantityError:  # told where the ball diameter is read
-            filled[f"{ring}_groove_radius"] = "1 m"
+    filled |= element.fill_contact(table.data["ball_diameter"], kind)
+    if "stiffness" in contact:
+        filled = {key: value for key, value in filled.items() if key in keys_of(element.given)}
     table.data = {**table.data, "contact": filled | contact}
+
+
+def _check_element(table: Table, kind: BearingType) -> None:
+    given = table.data["element"]
+    if given in ELEMENTS and given != kind.element:
+        table.fault(
+            "element",
+            f"the bearing {kind.designation} has other rolling elements",
+            given=show(given),
+            allowed=show(kind.element),
+            remedy="delete the key, or the designation",
+        )
+        table.data = {**table.data, "element": kind.element}  # no second fault

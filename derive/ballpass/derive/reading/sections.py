@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.elements import ELEMENTS
+from ballpass.derive.bearing.elements.element import RINGS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.drive import LAWS as TORQUE_LAWS
 from ballpass.derive.mechanism.forces import FORCE_TABLES, ForceTable
@@ -113,12 +115,19 @@ def _load() -> Iterator[Section]:
 
 
 def _bearing() -> Iterator[Section]:
-    yield _of("bearing", bearing_records.Bearing, bearing_records.Catalogue, designation=DESIGNATION)
+    yield _of(
+        "bearing",
+        bearing_records.Bearing,
+        bearing_records.Catalogue,
+        designation=DESIGNATION,
+        element=read_bearing.ELEMENT,
+    )
     yield _of("bearing.fit", Fit)
     yield _of("bearing.lubrication", bearing_records.Lubrication)
-    yield _of("bearing.contact", bearing_records.HertzContact, bearing_records.Material, fill=read_bearing.RINGS)
-    yield _of("bearing.contact", bearing_records.GivenContact)
-    yield _of("bearing.contact.ball_material", bearing_records.Material, fill=read_bearing.BALLS)
+    for element in ELEMENTS.values():
+        yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)
+        yield _of("bearing.contact", element.given)
+        yield _of("bearing.contact.ball_material", bearing_records.Material, fill=element.element_material)
     smoothing = keys_of(bearing_records.Damping)
     laws = {name: ({**law.keys, **(smoothing if law.kinked_at_rest else {})}, law.either) for name, law in LAWS.items()}
     yield from _variants("bearing.damping", read_bearing.LAW, "law", laws)

@@ -13,8 +13,9 @@ from difflib import get_close_matches
 from typing import Any, cast
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.reading.clearance_groups import clearance_of_group
-from ballpass.derive.scene.bearing_records import Bearing, CageMotion, HertzContact
+from ballpass.derive.scene.bearing_records import Bearing, CageMotion
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
@@ -60,9 +61,7 @@ def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
         relations.append((pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball))
         relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
         relations += [r for effect in bearing.effects for r in EFFECTS[effect.kind].relations(effect, bearing)]
-        if isinstance(bearing.contact, HertzContact):
-            grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
-            relations += [(radius.path, 0.5, ball) for radius in grooves]
+        relations += ELEMENTS[bearing.element].relations(bearing)
     return tuple(relations)
 
 
@@ -233,8 +232,7 @@ def _check_windows(checker: Checker, load: Load) -> None:
 def _check_bearing(checker: Checker, bearing: Bearing) -> None:
     _check_balls(checker, bearing)
     _check_preload(checker, bearing)
-    if isinstance(bearing.contact, HertzContact):
-        _check_grooves(checker, bearing.contact, bearing.ball_diameter)
+    ELEMENTS[bearing.element].check(checker, bearing)
     for effect in bearing.effects:
         EFFECTS[effect.kind].check(effect, checker, bearing)
     if bearing.cage is not None:
@@ -293,18 +291,6 @@ def _check_preload(checker: Checker, bearing: Bearing) -> None:
         f"a diametral clearance above -{ball.value:.9g} m, the ball diameter",
         'check its unit: clearances are some micrometres, "10 um"',
     )
-
-
-def _check_grooves(checker: Checker, contact: HertzContact, ball: SceneNumber) -> None:
-    for radius in (contact.inner_groove_radius, contact.outer_groove_radius):
-        if 0.0 < radius.value <= 0.5 * ball.value:
-            checker.fault(
-                radius.path,
-                "the groove is not wider than the ball",
-                f"groove radius {checker.show(radius)}, ball diameter {checker.show(ball)}",
-                f"a radius above half the ball diameter, {0.5e3 * ball.value:.6g} mm",
-                "give 0.51 to 0.54 of the ball diameter, as deep groove ball bearings have",
-            )
 
 
 def _check_run(checker: Checker, scene: Scene) -> None:

@@ -53,7 +53,8 @@ def _groove(ring: str, symbol: str, example: str) -> Any:
     )
 
 
-def _smoothing() -> Any:
+def smoothing_key() -> Any:
+    """The key of the smoothed onset of a contact."""
     hint = "The contact then acts where ball and raceway are apart: give a smaller width."
     return positive(
         "m",
@@ -79,7 +80,7 @@ class HertzContact:
     outer_groove_radius: SceneNumber = _groove("outer", "r_e", "4.206875 mm")
     ring: Material
     ball: Material | None
-    smoothing: SceneNumber | None = _smoothing()
+    smoothing: SceneNumber | None = smoothing_key()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +90,7 @@ class GivenContact:
     stiffness: SceneNumber = positive(
         "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5"
     )
-    smoothing: SceneNumber | None = _smoothing()
+    smoothing: SceneNumber | None = smoothing_key()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -278,14 +279,15 @@ class Lubrication:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bearing:
-    """A deep groove ball bearing.
+    """A rolling bearing.
 
     `name` is empty for the scene's only ``[bearing]``; ``[bearings.<name>]`` have one.  `joint` names the revolute
     joint whose reaction loads it (None without mechanism).
     `coupling` one-way: `share` is the part of the ideal reaction it takes, `inner` what moves with the inner ring.
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
-    `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
+    `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
+    structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
     nothing of that kind.
     """
@@ -348,12 +350,13 @@ class Bearing:
     ball_angle: SceneNumber = quantity(
         "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"
     )
-    contact: HertzContact | GivenContact
+    contact: Any
     damping: Damping
     effects: tuple[BallEffect, ...]
     inner: InnerRing | None
     outer: OuterRing | None
     initial: InitialState
+    element: str = "ball"
     catalogue: Catalogue | None = None
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None

@@ -1,7 +1,7 @@
-"""Deep groove ball bearings by designation, and groups of clearance.
+"""Bearings by designation, and groups of clearance.
 
-In: a designation ("6204"), a bore.  Out: dimensions, balls and ratings of catalogues; the clearance of a group.  Where
-the numbers are from, and which of them no standard fixes, is said at the head of ``deep_groove.csv``.
+In: a designation ("6204"), a bore.  Out: dimensions, elements and ratings of catalogues; the clearance of a group.
+Where the numbers are from, and which of them no standard fixes, is said at the head of each table (``*.csv``).
 """
 
 from __future__ import annotations
@@ -14,21 +14,12 @@ from importlib.resources import files
 
 #: Groove radius over ball diameter, inner and outer: reference values of ISO 16281.
 GROOVES = (Decimal("0.52"), Decimal("0.53"))
-#: Radial clearance of deep groove ball bearings with cylindrical bore, lowest and highest [µm], by the bore up to which
-#: [mm] it holds; ISO 5753-1.  It is the diametral clearance P_d: the way of one ring from one side to the other.
+#: Groups of radial clearance of bearings with cylindrical bore; ISO 5753-1.  It is the diametral clearance P_d: the way
+#: of one ring from one side to the other.  Their ranges are in ``clearances.csv``.
 GROUPS = ("C2", "CN", "C3", "C4", "C5")
-_CLEARANCES: tuple[tuple[int, tuple[tuple[int, int] | None, ...]], ...] = (
-    (6, ((0, 7), (2, 13), (8, 23), None, None)),
-    (10, ((0, 7), (2, 13), (8, 23), (14, 29), (20, 37))),
-    (18, ((0, 9), (3, 18), (11, 25), (18, 33), (25, 45))),
-    (24, ((0, 10), (5, 20), (13, 28), (20, 36), (28, 48))),
-    (30, ((1, 11), (5, 20), (13, 28), (23, 41), (30, 53))),
-    (40, ((1, 11), (6, 20), (15, 33), (28, 46), (40, 64))),
-    (50, ((1, 11), (6, 23), (18, 36), (30, 51), (45, 73))),
-    (65, ((1, 15), (8, 28), (23, 43), (38, 61), (55, 90))),
-    (80, ((1, 15), (10, 30), (25, 51), (46, 71), (65, 105))),
-    (100, ((1, 18), (12, 36), (30, 58), (53, 84), (75, 120))),
-)
+#: The usual bearings: their table comes first, and says nothing of their element.
+FIRST = "deep_groove.csv"
+MAKERS = ("nsk", "koyo", "skf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,39 +34,50 @@ class CatalogueRating:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingType:
-    """A bearing of the table; lengths as decimals in mm, so that what follows from them is exact."""
+    """A bearing of a table; lengths as decimals in mm, so that what follows from them is exact.
+
+    `length` is the effective one of rollers, None of balls.
+    """
 
     designation: str
+    element: str
     bore: Decimal
     outside: Decimal
     width: Decimal
     balls: int
     ball_diameter: Decimal
+    pitch_diameter: Decimal
+    length: Decimal | None
     catalogues: tuple[CatalogueRating, ...]
-
-    @property
-    def pitch_diameter(self) -> Decimal:
-        """Mean of bore and outside diameter [mm]: a rule, not a standard."""
-        return (self.bore + self.outside) / 2
 
     def clearance(self, group: str) -> tuple[int, int] | None:
         """Lowest and highest clearance of a group [µm]; None where ISO 5753-1 has none for this bore."""
-        row = next(row for bore, row in _CLEARANCES if self.bore <= bore)
-        return row[GROUPS.index(group)]
+        rows = (row for row in _rows("clearances.csv") if row["element"] == self.element)
+        text = next(row for row in rows if self.bore <= int(row["bore"]))[group]
+        least, _, most = text.partition("-")
+        return (int(least), int(most)) if text else None
+
+
+@cache
+def _rows(table: str) -> list[dict[str, str]]:
+    """Rows of a table, without its notes."""
+    text = files("ballpass.derive.scene").joinpath(table).read_text(encoding="utf-8")
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
 @cache
 def bearing_types() -> dict[str, BearingType]:
-    """All bearings of the table by designation, in its order."""
-    text = files("ballpass.derive.scene").joinpath("deep_groove.csv").read_text(encoding="utf-8")
-    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
-    return {row["designation"]: _bearing_type(row) for row in rows}
+    """All bearings of the tables by designation, in their order."""
+    names = (path.name for path in files("ballpass.derive.scene").iterdir() if path.name.endswith(".csv"))
+    rows = (row for name in sorted(names, key=lambda name: (name != FIRST, name)) for row in _rows(name))
+    return {row["designation"]: _bearing_type(row) for row in rows if "designation" in row}
 
 
 def _bearing_type(row: dict[str, str]) -> BearingType:
+    bore, outside = Decimal(row["bore"]), Decimal(row["outside"])
     catalogues = []
-    for maker in ("nsk", "koyo", "skf"):
-        if row[f"{maker}_dynamic"]:
+    for maker in MAKERS:
+        if row.get(f"{maker}_dynamic"):
             limit = row.get(f"{maker}_limit")
             catalogues.append(
                 CatalogueRating(
@@ -87,10 +89,14 @@ def _bearing_type(row: dict[str, str]) -> BearingType:
             )
     return BearingType(
         designation=row["designation"],
-        bore=Decimal(row["bore"]),
-        outside=Decimal(row["outside"]),
+        element=row.get("element", "ball"),
+        bore=bore,
+        outside=outside,
         width=Decimal(row["width"]),
         balls=int(row["balls"]),
         ball_diameter=Decimal(row["ball_diameter"]),
+        # a rule, not a standard, where the table has none: the mean of bore and outside diameter
+        pitch_diameter=Decimal(row["pitch_diameter"]) if "pitch_diameter" in row else (bore + outside) / 2,
+        length=Decimal(row["length"]) if "length" in row else None,
         catalogues=tuple(catalogues),
     )

@@ -31,7 +31,7 @@ NUMBER = r"^\s*[-+]?(\d|\.\d)"
 def filled(text: str, fill: Fill) -> str:
     """A text with its placeholders replaced, in one pass, because names of the scene may look like placeholders."""
     longest_first = sorted(fill, key=len, reverse=True)
-    return re.sub("|".join(longest_first), lambda match: fill[match[0]], text) if fill else text
+    return re.sub("|".join(map(re.escape, longest_first)), lambda match: fill[match[0]], text) if fill else text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -52,6 +52,7 @@ class BearingStrength(ShortRepr):
     Attributes
     ----------
     name : empty for the scene's only one
+    element : kind of its rolling elements, for which "ball" stands in all names
     dynamic_rating, static_rating, fatigue_limit : C_r, C_0r, C_u [N]
     given : which of these the scene gives; the others follow from the geometry
     assumed : whether grooves and steel are the reference ones, for the scene gives a stiffness
@@ -76,6 +77,7 @@ class BearingStrength(ShortRepr):
     """
 
     name: str
+    element: str
     dynamic_rating: float
     static_rating: float
     fatigue_limit: float

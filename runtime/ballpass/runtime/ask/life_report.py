@@ -97,11 +97,12 @@ def _bearing(
     why = why_no_life(info, values, initial)
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
-    load = samples.equivalent_load
+    load = samples.equivalent_load(float(ratings.life.basic))
     ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
     strength = BearingStrength(
         name=info.name,
+        element=info.element,
         dynamic_rating=float(ratings.dynamic),
         static_rating=float(ratings.static),
         fatigue_limit=float(ratings.fatigue_limit),
@@ -117,7 +118,7 @@ def _bearing(
         speed=speed,
         why_no_life=why,
         equivalent_load=load,
-        basic_life=None if why else _basic(float(ratings.dynamic), load),
+        basic_life=None if why else _basic(ratings, load),
         lives=found,
         viscosity_ratio=ratio,
         contamination=contamination,
@@ -132,8 +133,8 @@ def static_safety(balls: int, static_rating: float, force: float) -> float:
     return float(life.static_safety(static_rating, balls * force / 5.0)) if force > 0.0 else math.inf
 
 
-def _basic(dynamic_rating: float, load: float) -> float:
-    return float(life.basic_life(dynamic_rating, load)) if load > 0.0 else math.inf
+def _basic(ratings: Ratings, load: float) -> float:
+    return float(life.basic_life(ratings.dynamic, load, ratings.life)) if load > 0.0 else math.inf
 
 
 def _rings(
@@ -147,11 +148,12 @@ def _rings(
     turns: bool,
 ) -> tuple[RingStrength, RingStrength]:
     """Inner and outer ring."""
-    loads = equivalent_loads(powers)
+    loads = equivalent_loads(powers, ratings.life)
+    root, standing = float(1 / ratings.life.turning), float(ratings.life.standing)
     fields = (powers.raceways[1], powers.raceways[0])
-    # (Q_e/Q_c)^(10/3) of a ring is the mean of this over its places
+    # (Q_e/Q_c) of a ring, to the exponent of a standing one, is the mean of this over its places
     damage = [
-        (KILO * field ** (1.0 / 3.0) / float(rating)) ** (10.0 / 3.0)
+        (KILO * field**root / float(rating)) ** standing
         for field, rating in zip(fields, (ratings.inner_ball, ratings.outer_ball), strict=True)
     ]
     total = float(sum(np.sum(part) for part in damage))
@@ -187,9 +189,9 @@ def _modified(
         assert film.viscosity is not None  # the scene gives one of them
         ratio = life.viscosity_ratio(film.viscosity, speed, values[f"{info.path}.pitch_diameter"])
     shortest = min(found.values())
-    load = life.equivalent_load(ratings.dynamic, shortest)
+    load = life.equivalent_load(ratings.dynamic, shortest, ratings.life)
     limit = film.contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
-    factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit))
+    factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit, ratings.life.factor))
     return ratio, film.contamination, factor, float(life.modified_life(shortest, factor))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, StateStrength
+from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.report.report import Report, ReportTable, Words
@@ -134,18 +135,18 @@ def _state_parts(state: StateStrength) -> _Parts:
 
 
 def _bearing_parts(bearing: BearingStrength) -> _Parts:
-    rings = (bearing.inner, bearing.outer)
+    rings, element = (bearing.inner, bearing.outer), RATED[bearing.element]
     at = f"{bearing.peak_time:.5g} s"
     if bearing.peak_angle is not None:
         at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
     rows: list[tuple[str, ...]] = [
         ("peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
-        ("ellipse, a x b", *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
+        (element.contact_words, *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
     ]
     for reading in bearing.lives:
         mark = GOVERNS if reading == bearing.governing else ""
         loads = (_force(ring.equivalent_loads[reading]) for ring in rings)
-        rows.append((f"equivalent ball load by {reading}{mark}", *loads))
+        rows.append((f"equivalent {element.noun} load by {reading}{mark}", *loads))
     if bearing.lives:
         rows += [
             ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
@@ -161,8 +162,8 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
         f"  C_r {_force(bearing.dynamic_rating)} ({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
         f"C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
-        f"C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', 'C_0r/22')})",
-        f"  highest ball force {_force(bearing.peak_force)}: ball {bearing.peak_ball}, {at}",
+        f"C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
+        f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
         f"  static safety s_0 {bearing.static_safety:.3g}",
         ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
     ]

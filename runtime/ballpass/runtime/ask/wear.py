@@ -49,12 +49,11 @@ class LoadSamples:
     in_outer: Array
     in_inner: Array
 
-    @property
-    def equivalent_load(self) -> float:
-        """P of ISO 281, cubic mean over the angle that the rings turn against each other, else over time [N]."""
+    def equivalent_load(self, power: float) -> float:
+        """P of ISO 281, mean of a power over the angle that the rings turn against each other, else over time [N]."""
         turned = np.abs(_moved(self.in_outer) - _moved(self.in_inner))
         weight = turned if np.any(turned) else np.ones_like(turned)
-        return float(np.average(self.resultant**3, weights=weight) ** (1.0 / 3.0))
+        return float(np.average(self.resultant**power, weights=weight) ** (1.0 / power))
 
 
 def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSamples]:

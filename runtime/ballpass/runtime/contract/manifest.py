@@ -239,7 +239,8 @@ class BearingInfo:
 
     `name` is empty for the scene's only ``[bearing]``.  Its states and outputs begin with `prefix`, ``""`` or
     ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
-    `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one.
+    `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
+    `element` is the kind of its rolling elements, for which "ball" stands in all other names.
     """
 
     name: str
@@ -253,6 +254,7 @@ class BearingInfo:
     damping: DampingInfo
     catalogue: CatalogueInfo | None = None
     lubrication: LubricationInfo | None = None
+    element: str = "ball"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

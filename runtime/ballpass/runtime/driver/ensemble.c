@@ -47,14 +47,15 @@ static void begin_segment(const bp_job *job, long m)
 }
 
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
-/* Third powers of the balls' loads, out of all quantities of the balls. */
-static void put_cubes(bp_lane_block *b, int lane, const double *balls)
+/* First powers of the balls' loads, out of all quantities of the balls. */
+static void put_powers(bp_lane_block *b, int lane, const double *balls)
 {
 #define BP_PUT(b_)                                                                                       \
     for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                          \
         const double force = balls[BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL + j];                         \
         const double load = force > 0.0 ? 1e-3 * force : 0.0;                                            \
-        b->cubes[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] = load * load * load;                      \
+        b->first[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] =                                          \
+            bp_power(load, BP_##b_##_TURNING, BP_##b_##_TURNING_BY);                                     \
     }
     BP_EACH_BEARING(BP_PUT)
 #undef BP_PUT
@@ -90,7 +91,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES];
         bp_channels(&n, at->t, x, b->balls, b->powers, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
-        if (b->powers) put_cubes(b, lane, balls);
+        if (b->powers) put_powers(b, lane, balls);
         b->reducing[lane] = 1.0;
     }
 }

@@ -52,7 +52,7 @@ typedef struct {
     /* reductions */
     double dense[BP_DENSE_ROWS][BP_NX * BP_L] BP_ALIGNED;
     double sampled[BP_POINTS][BP_CHANNELS * BP_L] BP_ALIGNED;
-    double cubes[BP_POINTS][(BP_NB > 0 ? BP_NB : 1) * BP_L] BP_ALIGNED; /* third powers of the balls' loads at the quarters, where wanted */
+    double first[BP_POINTS][(BP_NB > 0 ? BP_NB : 1) * BP_L] BP_ALIGNED; /* first powers of the balls' loads at the quarters, where wanted */
     double maximum[BP_CHANNELS * BP_L] BP_ALIGNED, minimum[BP_CHANNELS * BP_L] BP_ALIGNED;
     double integral[BP_CHANNELS * BP_L] BP_ALIGNED, square[BP_CHANNELS * BP_L] BP_ALIGNED;
     long who[BP_L];

@@ -90,7 +90,7 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
     for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
         bp_member_##b##_##kernel##_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                       \
         for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
         for (int m = 0; m < (slopes); m++)                                                                                       \
@@ -142,24 +142,25 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 
-/* Third power of a ball's load, and its share in the means over the balls. */
-BP_INLINE void bp_lane_powers(const double *restrict force, double share, int rooted, double *restrict cubes, double *restrict power)
-{
-    double load[BP_L] BP_ALIGNED;
-    BP_EACH_LANE {
-        load[lane] = force[lane] > 0.0 ? 1e-3 * force[lane] : 0.0;
-        cubes[lane] = load[lane] * load[lane] * load[lane];
-        power[lane] += share * cubes[lane];
+/* First power of the load of a ball of bearing b, and its share in the means over the balls. */
+#define BP_LANE_POWERS(b, force, rooted, first, power)                                                                           \
+    {                                                                                                                            \
+        const double share = 1.0 / BP_##b##_BALLS;                                                                               \
+        double load[BP_L] BP_ALIGNED;                                                                                            \
+        BP_EACH_LANE {                                                                                                           \
+            load[lane] = (force)[lane] > 0.0 ? 1e-3 * (force)[lane] : 0.0;                                                       \
+            (first)[lane] = bp_power(load[lane], BP_##b##_TURNING, BP_##b##_TURNING_BY);                                         \
+            (power)[lane] += share * (first)[lane];                                                                              \
+        }                                                                                                                        \
+        if (rooted)                                                                                                              \
+            BP_EACH_LANE (power)[BP_L + lane] += share * bp_power(load[lane], BP_##b##_STANDING, BP_##b##_STANDING_BY);          \
     }
-    if (!rooted) return;
-    BP_EACH_LANE power[BP_L + lane] += share * (cubes[lane] * bp_cube_root(load[lane]));
-}
 
 /* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball, then, where they are wanted,
-   three powers of the loads and 1; and then the third powers of all balls. */
+   three powers of the loads and 1; and then the first powers of all balls. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
                                          const double *restrict t, const double *restrict h, const double *restrict x, int powers,
-                                         double *restrict value, double *restrict cubes)
+                                         double *restrict value, double *restrict first)
 {
     double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
     double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
@@ -171,17 +172,16 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
 #define BP_CHANNEL(b)                                                                                                            \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
         bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
-        if (powers)                                                                                                              \
-            bp_lane_powers(rows, 1.0 / BP_##b##_BALLS, powers > 1, cubes + (BP_##b##_FIRST_BALL + j) * BP_L, power + BP_POWERS * (b) * BP_L); \
-    }
+        if (powers) BP_LANE_POWERS(b, rows, powers > 1, first + (BP_##b##_FIRST_BALL + j) * BP_L, power + BP_POWERS * (b) * BP_L) \
+    }                                                                                                                            \
+    if (powers > 1)                                                                                                              \
+        BP_EACH_LANE power[(BP_POWERS * (b) + 2) * BP_L + lane] = bp_power(power[(BP_POWERS * (b) + 1) * BP_L + lane], BP_##b##_DAMAGE, BP_##b##_DAMAGE_BY);
     BP_EACH_BEARING(BP_CHANNEL)
 #undef BP_CHANNEL
-    for (int b = 0; b < BP_BEARINGS && powers > 1; b++)
-        BP_EACH_LANE power[(BP_POWERS * b + 2) * BP_L + lane] = bp_nine_tenths(power[(BP_POWERS * b + 1) * BP_L + lane]);
 }
 
 #endif

@@ -47,12 +47,12 @@ static void add_passes(const bp_job *job, bp_lane_block *b, const double *add, c
     for (int j = 0; j < BP_NB; j++) {
         const int i = j * BP_L;
         BP_EACH_LANE {
-            const double c0 = bp_boole[0] * b->cubes[0][i + lane], c1 = bp_boole[1] * b->cubes[1][i + lane];
-            const double c2 = bp_boole[2] * b->cubes[2][i + lane], c3 = bp_boole[3] * b->cubes[3][i + lane];
-            const double c4 = bp_boole[4] * b->cubes[4][i + lane];
+            const double c0 = bp_boole[0] * b->first[0][i + lane], c1 = bp_boole[1] * b->first[1][i + lane];
+            const double c2 = bp_boole[2] * b->first[2][i + lane], c3 = bp_boole[3] * b->first[3][i + lane];
+            const double c4 = bp_boole[4] * b->first[4][i + lane];
             sum[j][lane] = c0 + c1 + c2 + c3 + c4;
             moment[j][lane] = 0.25 * c1 + 0.5 * c2 + 0.75 * c3 + c4;
-            b->cubes[0][i + lane] = add[lane] != 0.0 ? b->cubes[BP_POINTS - 1][i + lane] : b->cubes[0][i + lane];
+            b->first[0][i + lane] = add[lane] != 0.0 ? b->first[BP_POINTS - 1][i + lane] : b->first[0][i + lane];
         }
     }
     for (int lane = 0; lane < BP_L; lane++) {
@@ -96,7 +96,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         else if (b->linearly) bp_lane_rosenbrock_at(&bp_rodas5p, dense, b->x, b->next, theta, y);
         else bp_lane_explicit_at(&bp_dp54, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
-        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->cubes[q]);
+        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->first[q]);
     }
     double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};

@@ -111,6 +111,9 @@ static inline __attribute__((always_inline)) double bp_total(const double *restr
     return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
 }
 
+/* Place of the cosine of a cage's angle in the relative motion r; its sine follows. */
+#define BP_CAGE(b) (BP_RELATIVE * (b) + BP_RINGS)
+
 /* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine are given.  One ball a lane. */
 static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict cage, const double *restrict cage_cos,
                                                                      const double *restrict cage_sin, const int balls, double *restrict co,
@@ -127,7 +130,7 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
 /* Directions co, si and numbers k of the balls of bearing b, from the relative motion r and the stage variables w; room for `count` rows of summands. */
 #define BP_BALLS(b, count)                                                                                                    \
     double co[BP_##b##_BALLS], si[BP_##b##_BALLS], k[BP_##b##_NK], rows[(count) * BP_##b##_BALLS];                            \
-    bp_ball_directions(r + BP_RELATIVE * (b) + 5, bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
+    bp_ball_directions(r + BP_CAGE(b), bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
     bp_##b##_numbers(n->p, n->c, w, k);
 
 /* Rows from the `first` on, added up. */

@@ -1,13 +1,17 @@
-/* Roots of loads, without a branch: the compiler makes SIMD lanes of loops around them. */
+/* Powers with rational exponents, without a branch: the compiler makes SIMD lanes of loops around them. */
 #ifndef BALLPASS_POWERS_H
 #define BALLPASS_POWERS_H
 
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
+#define BP_POWER static inline __attribute__((always_inline))
+
 /* 1 / x^(1/n) within a tenth, for 1e-30 <= x <= 1e30: the exponent is divided by n in place. */
-static inline double bp_root_guess(double x, int32_t first, int32_t n)
+BP_POWER double bp_root_guess(double x, const int32_t n)
 {
+    const int32_t first = (int32_t)((1.0 + 1.0 / n) * 1064923135.5); /* the bits of one, less what a straight line is off a logarithm */
     float narrow = (float)x;
     int32_t bits;
     memcpy(&bits, &narrow, sizeof bits);
@@ -16,28 +20,38 @@ static inline double bp_root_guess(double x, int32_t first, int32_t n)
     return narrow;
 }
 
-/* x^(1/3) by two steps of fourth order for its inverse, to 1e-15; x >= 0. */
-static inline double bp_cube_root(double x)
+/* x^n for a constant n >= 0. */
+BP_POWER double bp_whole_power(double x, const int n)
 {
-    const double z = x > 1e-30 ? x : 1e-30;
-    double r = bp_root_guess(z, 0x54a1eaaa, 3);
-    for (int i = 0; i < 2; i++) {
-        const double left = 1.0 - z * (r * r * r);
-        r += r * left * (1.0 / 3.0 + left * (2.0 / 9.0 + left * (14.0 / 81.0)));
-    }
-    return x * (r * r);
+    double power = n > 0 ? x : 1.0;
+    for (int i = 1; i < n; i++) power *= x;
+    return power;
 }
 
-/* x^(9/10) by Newton's iteration for the inverse of the tenth root. */
-static inline double bp_nine_tenths(double x)
+/* 1 / x^(1/n) for a constant n > 2 and 1e-30 <= x <= 1e30, by steps of fourth order: two for a cube root, three for roots up to the twelfth. */
+BP_POWER double bp_inverse_root(double x, const int n)
 {
-    const double z = x > 1e-30 ? x : 1e-30;
-    double r = bp_root_guess(z, 0x45d23999, 10);
-    for (int i = 0; i < 5; i++) {
-        const double s = r * r, q = s * s;
-        r += r * (1.0 - z * (q * q * s)) * 0.1;
+    double r = bp_root_guess(x, n);
+    const double a = 1.0 / n, b = (n + 1.0) / (2.0 * n * n), c = (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n * n * n);
+    for (int i = 0; i < (n == 3 ? 2 : 3); i++) {
+        const double left = 1.0 - x * bp_whole_power(r, n);
+        r += r * left * (a + left * (b + left * c));
     }
-    return x * r;
+    return r;
+}
+
+/* x^(p/q) of constants p, q for x >= 0; where p < 0, or q > 2 and x below 1e-30, as if x were 1e-30 where it is smaller. */
+BP_POWER double bp_power(double x, const int p, const int q)
+{
+    if (q == 1 && p >= 0) return bp_whole_power(x, p);
+    const double z = x > 1e-30 ? x : 1e-30;
+    if (q <= 2) {
+        const int whole = p > 0 ? p / 2 : 0;
+        return q == 1 ? 1.0 / bp_whole_power(z, -p) : p > 0 ? bp_whole_power(x, whole) * sqrt(x) : 1.0 / (bp_whole_power(z, -p / 2) * sqrt(z));
+    }
+    const int above = p > 0 ? (p + q - 1) / q : 0; /* x^(p/q) = x^above / x^(1/q)^(q above - p) */
+    const double rest = bp_whole_power(bp_inverse_root(z, q), q * above - p);
+    return above > 0 ? bp_whole_power(x, above - 1) * (x * rest) : rest;
 }
 
 #endif

@@ -12,12 +12,12 @@
    DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
    an extrapolation across a kink.
 
-   What fatigue needs of a bearing's balls follows behind: the mean over them of the third power of their load, of its power 10/3, and the
-   latter to the power 9/10, loads in kN and nothing where they pull; and one.  Only their integrals mean something.  Fatigue counts passes:
-   these integrals are over the angle that the inner ring turns against the outer one, in either sense, and that of one is this angle.
-   Where they are wanted, the third power is added up over the places of both raceways as well: each raceway's places are hat functions,
-   BP_SECTORS of them, in the ring's own coordinates, and what a ball gives in a step acts at its centroid, so that amount and first moment
-   are right.
+   What fatigue needs of a bearing's balls follows behind: the mean over them of the powers of their load that the rolling element's life
+   takes, of a ring that turns against the load and of one that stands, and of the latter a root that gives damage; loads in kN and nothing
+   where they pull; and one.  Only their integrals mean something.  Fatigue counts passes: these integrals are over the angle that the
+   inner ring turns against the outer one, in either sense, and that of one is this angle.  Where they are wanted, the first power is added
+   up over the places of both raceways as well: each raceway's places are hat functions, BP_SECTORS of them, in the ring's own coordinates,
+   and what a ball gives in a step acts at its centroid, so that amount and first moment are right.
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
@@ -55,7 +55,7 @@ enum {
     BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
     BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time; of powers over the angle turned [rad] */
     BP_SQUARE = BP_INTEGRAL + BP_CHANNELS,   /* of its square */
-    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the third power likewise [kN^3 rad]: of each bearing outer, then inner raceway */
+    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the first power likewise: of each bearing outer, then inner raceway */
     BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
 };
 
@@ -77,7 +77,7 @@ static inline int bp_balls_wanted(const double *reduction)
     return wanted;
 }
 
-/* 1 where third powers are, 2 where powers that need roots are wanted as well. */
+/* 1 where the first powers are, 2 where those that may need roots are wanted as well. */
 static inline int bp_powers_wanted(const double *reduction)
 {
     int powers = 0, rooted = 0;
@@ -130,21 +130,21 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* Means over so many balls of powers of their forces `of` [N]: third, 10/3, and that to the power 9/10; in kN.  Behind them 1. */
-static inline void bp_powers(const double *restrict of, int balls, int rooted, double *restrict power)
-{
-    double cubes = 0.0, more = 0.0;
-#pragma omp simd reduction(+ : cubes, more)
-    for (int j = 0; j < balls; j++) {
-        const double load = of[j] > 0.0 ? 1e-3 * of[j] : 0.0, cube = load * load * load;
-        cubes += cube;
-        more += rooted ? cube * bp_cube_root(load) : 0.0;
+/* Means over the balls of bearing b of powers of their forces `of` [N], loads in kN, into power[0 ... 2]; behind them 1. */
+#define BP_MEAN_POWERS(b, of, rooted, power)                                                           \
+    {                                                                                                  \
+        double turning = 0.0, standing = 0.0;                                                          \
+        _Pragma("omp simd reduction(+ : turning, standing)")                                           \
+        for (int j = 0; j < BP_##b##_BALLS; j++) {                                                     \
+            const double load = (of)[j] > 0.0 ? 1e-3 * (of)[j] : 0.0;                                  \
+            turning += bp_power(load, BP_##b##_TURNING, BP_##b##_TURNING_BY);                          \
+            standing += (rooted) ? bp_power(load, BP_##b##_STANDING, BP_##b##_STANDING_BY) : 0.0;      \
+        }                                                                                              \
+        (power)[0] = turning / BP_##b##_BALLS;                                                         \
+        (power)[1] = standing / BP_##b##_BALLS;                                                        \
+        (power)[2] = (rooted) ? bp_power((power)[1], BP_##b##_DAMAGE, BP_##b##_DAMAGE_BY) : 0.0;       \
+        (power)[3] = 1.0;                                                                              \
     }
-    power[0] = cubes / balls;
-    power[1] = more / balls;
-    power[2] = rooted ? bp_nine_tenths(more / balls) : 0.0;
-    power[3] = 1.0;
-}
 
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
 static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, int powers, double *restrict value,
@@ -162,7 +162,8 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
         value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
     }                                                                                                  \
-    if (powers) bp_powers(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, BP_##b##_BALLS, powers > 1, value + BP_LOOKED_AT + BP_POWERS * (b));
+    if (powers)                                                                                        \
+        BP_MEAN_POWERS(b, q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, powers > 1, value + BP_LOOKED_AT + BP_POWERS * (b))
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
 }
@@ -171,7 +172,7 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
 
    sectors   of the outer, then of the inner raceway
    ball      as a part of a turn behind ball 1
-   amount    integral of the third power over the angle turned in the step [kN^3 rad]
+   amount    integral of the first power over the angle turned in the step
    centroid  of it, as a part of the step
    from, to  angle of ball 1 as outer and inner ring see it at both ends of the step [rad] */
 static inline void bp_add_places(double *restrict sectors, double ball, double amount, double centroid, const double *restrict from,
@@ -189,16 +190,19 @@ static inline void bp_add_places(double *restrict sectors, double ball, double a
 /* Angle that the inner ring turns against the outer one in a step, in either sense [rad]; arguments as above. */
 static inline double bp_turned(const double *restrict from, const double *restrict to) { return fabs(to[0] - from[0] - (to[1] - from[1])); }
 
-/* Add what all balls of a bearing give, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart. */
-static inline void bp_add_sectors(double *restrict sectors, int balls, double turned, const double *restrict of, const double *restrict from,
-                                  const double *restrict to)
+/* Add what all balls of a bearing give, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart; the first power
+   of the loads is p/q. */
+static inline __attribute__((always_inline)) void bp_add_sectors(double *restrict sectors, int balls, const int p, const int q, double turned,
+                                                                 const double *restrict of, const double *restrict from,
+                                                                 const double *restrict to)
 {
     for (int j = 0; j < balls; j++) {
         double sum = 0.0, moment = 0.0;
         for (int i = 0; i < BP_POINTS; i++) {
             const double force = of[i * BP_BALL_QUANTITIES + j], load = force > 0.0 ? 1e-3 * force : 0.0;
-            sum += bp_boole[i] * (load * load * load);
-            moment += 0.25 * i * bp_boole[i] * (load * load * load);
+            const double power = bp_power(load, p, q);
+            sum += bp_boole[i] * power;
+            moment += 0.25 * i * bp_boole[i] * power;
         }
         if (sum > 0.0) bp_add_places(sectors, (double)j / balls, turned * sum, moment / sum, from, to);
     }
@@ -591,8 +595,8 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
             if (reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0) reduction[BP_INTEGRAL + BP_LOOKED_AT + k] += turned * sum[BP_LOOKED_AT + k];
         }
 #define BP_ADD(b)                                                                                                                       \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, bp_turned(from + 2 * (b), to + 2 * (b)),              \
-                   of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_##b##_TURNING, BP_##b##_TURNING_BY,                \
+                   bp_turned(from + 2 * (b), to + 2 * (b)), of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
     }

@@ -293,7 +293,7 @@ static inline void bp_switch_moved(const ballpass_tangents *tangents, bp_tangent
 #define BP_MOVED(b)                                                                                                              \
     if (event >= BP_##b##_FIRST_EVENT && event < BP_##b##_FIRST_EVENT + BP_##b##_SWITCHES * BP_##b##_BALLS) {                    \
         const int j = (event - BP_##b##_FIRST_EVENT) % BP_##b##_BALLS, which = (event - BP_##b##_FIRST_EVENT) / BP_##b##_BALLS;  \
-        const double *const cd = rd + (BP_RELATIVE * (b) + 5) * BP_LANES, *const sd = cd + BP_LANES, *turn = r + BP_RELATIVE * (b) + 5; \
+        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES, *turn = r + BP_CAGE(b); \
         const double co = bp_##b##_cos[j] * turn[0] - bp_##b##_sin[j] * turn[1], si = bp_##b##_sin[j] * turn[0] + bp_##b##_cos[j] * turn[1]; \
         double k[BP_##b##_NK], kd[BP_##b##_NK * BP_LANES], cod[BP_LANES], sid[BP_LANES];                                         \
         double moved[(BP_##b##_SWITCHES + 1) * BP_LANES];                                                                        \

@@ -59,8 +59,8 @@ static inline void bp_sums_tangent(const bp_point *restrict at, const bp_directi
 {
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double c = at->r[BP_RELATIVE * (b) + 5], s = at->r[BP_RELATIVE * (b) + 6];                                         \
-        const double *const cd = rd + (BP_RELATIVE * (b) + 5) * BP_LANES, *const sd = cd + BP_LANES;                             \
+        const double c = at->r[BP_CAGE(b)], s = at->r[BP_CAGE(b) + 1];                                         \
+        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], angle[BP_LANES];                                                                      \
         bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
         _Pragma("omp simd")                                                                                                      \
@@ -93,7 +93,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
     for (int i = 0; i < BP_NG * BP_LANES; i++) Gd[i] = 0.0;
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double *const cd = rd + (BP_RELATIVE * (b) + 5) * BP_LANES, *const sd = cd + BP_LANES;                             \
+        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], *const to = Gd + BP_##b##_FIRST_SLOPE * BP_LANES;                                     \
         bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \

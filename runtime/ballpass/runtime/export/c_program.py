@@ -65,7 +65,7 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     ArtefactError
         The generated folder is missing, edited or without kernels.
     RequestError
-        The model has no states, so that there is nothing to integrate.
+        The model has no states, so that there is nothing to integrate, or the stepper does not take it.
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
@@ -89,6 +89,11 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
         raise RequestError(
             f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
             f"{folder / 'model.c'}. A scene with a bearing can be exported."
+        )
+    if manifest.unfit:
+        raise RequestError(
+            f"{manifest.scene}: the exported program is the project's own stepper, which does not take this scene: "
+            f"{manifest.unfit}. The model's functions are in {folder / 'model.c'}."
         )
     texts = {
         "scene.h": scene_header(manifest),

@@ -134,7 +134,7 @@ class LoadedModel(CompiledFunctions):
         return self._locating(LOCATING)
 
     def _locating(self, sources: DriverSources) -> Stepper:
-        if sources not in self._drivers and not (self.folder / SWITCHES).is_file():
+        if sources not in self._drivers and not self.manifest.unfit and not (self.folder / SWITCHES).is_file():
             raise ArtefactError(
                 f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
                 "`ballpass derive`, or leave kinks stepped-over."
@@ -164,6 +164,11 @@ class LoadedModel(CompiledFunctions):
         needs = "This needs the project's own stepper:"
         if not self.compiled:
             return f"{needs} it is compiled, and no C compiler was found. {INSTALL_COMPILER}."
+        if self.manifest.unfit:
+            return (
+                f"{needs} it does not take this scene: {self.manifest.unfit}. Run the model with method cvodes, for "
+                "samples; ensembles, reductions, lives and derivatives of runs are not to be had."
+            )
         return (
             f"{needs} the folder {self.folder} has no kernels for it. Write the folder again with `ballpass derive`, "
             "or run the model with method cvodes, for samples."

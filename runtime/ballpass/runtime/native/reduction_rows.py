@@ -24,9 +24,9 @@ ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", 
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
 BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
 
-#: Behind these for each bearing: means over its balls of powers of their loads [kN^3, kN^(10/3), kN^3], and one, whose
-#: integral is the angle that the inner ring turned against the outer one [rad].
-LOAD_POWERS = ("load.cubes", "load.ten_thirds", "load.outer_damage", "load.turned")
+#: Behind these for each bearing: means over its balls of powers of their loads, see `LoadPowers` of the readings, and
+#: one, whose integral is the angle that the inner ring turned against the outer one [rad].
+LOAD_POWERS = ("load.turning", "load.standing", "load.outer_damage", "load.turned")
 
 #: Places of a raceway.
 SECTORS = 72
@@ -65,7 +65,7 @@ class ReductionRows:
         return len(HEAD) + len(ROWS) * len(self.channels)
 
     def raceways(self, rows: np.ndarray, prefix: str) -> np.ndarray:
-        """Integrals of the third power of the ball loads at the places of both raceways of a bearing, over its angle.
+        """Integrals of the first power of the ball loads at the places of both raceways of a bearing, over its angle.
 
         Places are hat functions at equal distances, in the ring's own coordinates, from where its x axis was at the
         start.
@@ -73,7 +73,7 @@ class ReductionRows:
         Returns
         -------
         numpy.ndarray
-            Outer, then inner raceway [kN^3 rad], shape (members, 2, SECTORS).
+            Outer, then inner raceway, loads in kN, shape (members, 2, SECTORS).
         """
         first = self._sectors + 2 * SECTORS * (self.powers.index(prefix + LOAD_POWERS[0]) // len(LOAD_POWERS))
         return rows[:, first : first + 2 * SECTORS].reshape(len(rows), 2, SECTORS)

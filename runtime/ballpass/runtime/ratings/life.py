@@ -7,6 +7,8 @@ or each place of a raceway.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -20,8 +22,6 @@ MILLION = 1e6
 MOST_MODIFIED = 50.0
 #: Viscosity ratios that a_ISO covers: below it is refused, above it is taken as the upper one.
 VISCOSITY_RATIOS = (0.1, 4.0)
-#: Exponents of the mean over the loads of balls: where the ring turns against the load, and where it stands.
-TURNING, STANDING = 3.0, 10.0 / 3.0
 #: a_1 by reliability; ISO 281:2007.
 RELIABILITY = {0.90: 1.0, 0.95: 0.64, 0.96: 0.55, 0.97: 0.47, 0.98: 0.37, 0.99: 0.25}
 #: Contamination factor e_C by cleanliness: lowest and highest, D_pw below 100 mm, and from there on; ISO 281:2007
@@ -37,9 +37,54 @@ CONTAMINATION = {
 }
 
 
-def basic_life(dynamic_rating: Any, load: Any) -> Any:
-    """L_10 = (C/P)³ [turns]; ISO 281:2007."""
-    return MILLION * (dynamic_rating / load) ** 3
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeFactor:
+    """Numbers in a_ISO of a kind of element, see `life_factor`; `falls` are those of its three branches over κ."""
+
+    most: float
+    falls: tuple[float, float, float]
+    power: float
+    limit_power: Fraction
+    exponent: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElementLife:
+    """How the life of a kind of rolling element depends on its load.
+
+    Attributes
+    ----------
+    basic : exponent of L_10 over C/P
+    turning : exponent of the load of an element where the ring turns against the load
+    weibull : slope of the scatter of lives (Weibull's)
+    factor : of lubricant and dirt
+    """
+
+    basic: Fraction
+    turning: Fraction
+    weibull: Fraction
+    factor: LifeFactor
+
+    @property
+    def standing(self) -> Fraction:
+        """Exponent where the ring stands: its places fail together, by Weibull's law."""
+        return self.turning * self.weibull
+
+
+#: ISO 281:2007 and ISO 16281:2008, radial ball bearings.
+BALLS = ElementLife(
+    basic=Fraction(3),
+    turning=Fraction(3),
+    weibull=Fraction(10, 9),
+    factor=LifeFactor(
+        most=2.5671, falls=(2.2649, 1.9987, 1.9987), power=0.83, limit_power=Fraction(1, 3), exponent=9.3
+    ),
+)
+
+
+def basic_life(dynamic_rating: Any, load: Any, of: ElementLife = BALLS) -> Any:
+    """L_10 = (C/P)³ of balls, (C/P)^(10/3) of rollers [turns]; ISO 281:2007."""
+    return MILLION * (dynamic_rating / load) ** float(of.basic)
 
 
 def hours(turns: Any, speed: Any) -> Any:
@@ -72,8 +117,8 @@ def viscosity_ratio(viscosity: float, speed: float, pitch_diameter: float) -> fl
     return viscosity / reference_viscosity(speed, pitch_diameter)
 
 
-def life_factor(viscosity_ratio: Any, contaminated_limit: Any) -> Any:
-    """a_ISO of radial ball bearings [1]; ISO 281:2007.
+def life_factor(viscosity_ratio: Any, contaminated_limit: Any, of: LifeFactor = BALLS.factor) -> Any:
+    """a_ISO of radial bearings [1]; ISO 281:2007.
 
     Parameters
     ----------
@@ -93,9 +138,10 @@ def life_factor(viscosity_ratio: Any, contaminated_limit: Any) -> Any:
         )
     kappa = smaller(viscosity_ratio, most)
     # three branches that meet at 0.4 and 1; each is the one wanted where it is between the two others
-    fall = smaller(2.2649 * kappa**-0.054381, larger(1.9987 * kappa**-0.19087, 1.9987 * kappa**-0.071739))
-    bracket = 1.0 - (2.5671 - fall) ** 0.83 * contaminated_limit ** (1.0 / 3.0)
-    return 0.1 * larger(bracket, (MOST_MODIFIED / 0.1) ** (-1.0 / 9.3)) ** -9.3
+    thin, middle, thick = of.falls
+    fall = smaller(thin * kappa**-0.054381, larger(middle * kappa**-0.19087, thick * kappa**-0.071739))
+    bracket = 1.0 - (of.most - fall) ** of.power * contaminated_limit ** float(of.limit_power)
+    return 0.1 * larger(bracket, (MOST_MODIFIED / 0.1) ** (-1.0 / of.exponent)) ** -of.exponent
 
 
 def modified_life(life: Any, factor: Any, reliability: float = 0.90) -> Any:
@@ -129,10 +175,10 @@ def ball_ratings(
     gamma : D_w/D_pw [1]
     grooves : groove radius over ball diameter, inner and outer [1]
     """
-    ratio = ring_ratio(gamma, grooves) ** (10.0 / 3.0)
+    ratio, power = ring_ratio(gamma, grooves) ** float(BALLS.standing), float(1 / BALLS.standing)
     return (
-        dynamic_rating / (0.407 * balls) * (1.0 + ratio) ** 0.3,
-        dynamic_rating / (0.389 * balls) * (1.0 + 1.0 / ratio) ** 0.3,
+        dynamic_rating / (0.407 * balls) * (1.0 + ratio) ** power,
+        dynamic_rating / (0.389 * balls) * (1.0 + 1.0 / ratio) ** power,
     )
 
 
@@ -143,7 +189,7 @@ def mean_load(loads: Sequence[Any], exponent: float, shares: Sequence[Any] | Non
     return sum(share * load**exponent for share, load in zip(shares, loads, strict=True)) ** (1.0 / exponent)
 
 
-def equivalent_ball_load(loads: Sequence[Any], *, turning: bool) -> Any:
+def equivalent_ball_load(loads: Sequence[Any], *, turning: bool, of: ElementLife = BALLS) -> Any:
     """Q_e of a ring [N]; ISO 16281:2008.
 
     Parameters
@@ -151,32 +197,32 @@ def equivalent_ball_load(loads: Sequence[Any], *, turning: bool) -> Any:
     loads : of the balls [N]; the first axis of an array
     turning : whether the ring turns against the load, as the inner ring under a load that stands
     """
-    return mean_load(loads, TURNING if turning else STANDING)
+    return mean_load(loads, float(of.turning if turning else of.standing))
 
 
-def sector_ball_load(cubes: Sequence[Any]) -> Any:
+def sector_ball_load(powers: Sequence[Any], of: ElementLife = BALLS) -> Any:
     """Q_e of a ring whose places bear different loads [N].
 
-    A place of the raceway adds up damage by the cube of the loads that pass it, the places together fail by Weibull's
-    law: {mean over places of ⟨Q³⟩^(10/9)}^(3/10).  It is the cubic mean where all places bear the same, and the mean of
-    exponent 10/3 where each place bears one load: `equivalent_ball_load`.
+    A place of the raceway adds up damage by a power of the loads that pass it, of balls the third, and the places
+    together fail by Weibull's law: of balls {mean over places of ⟨Q³⟩^(10/9)}^(3/10).  It is the mean of a turning ring
+    where all places bear the same, and that of a standing one where each place bears one load: `equivalent_ball_load`.
 
     Parameters
     ----------
-    cubes : ⟨Q³⟩, mean over the passes at each of equal sectors, in the ring's own coordinates [N³]
+    powers : ⟨Q³⟩ (of rollers ⟨Q⁴⟩), mean over the passes at each of equal sectors, in the ring's own coordinates
     """
-    return mean_load([cube ** (1.0 / 3.0) for cube in cubes], STANDING)
+    return mean_load([power ** float(1 / of.turning) for power in powers], float(of.standing))
 
 
-def reference_life(ratings: tuple[Any, Any], equivalent_loads: tuple[Any, Any]) -> Any:
+def reference_life(ratings: tuple[Any, Any], equivalent_loads: tuple[Any, Any], of: ElementLife = BALLS) -> Any:
     """L_10r of both rings [turns], from Q_ci, Q_ce and Q_ei, Q_ee [N]; ISO 16281:2008."""
     rings = zip(ratings, equivalent_loads, strict=True)
-    return MILLION * sum((load / rating) ** (10.0 / 3.0) for rating, load in rings) ** -0.9
+    return MILLION * sum((load / rating) ** float(of.standing) for rating, load in rings) ** -float(1 / of.weibull)
 
 
-def equivalent_load(dynamic_rating: Any, life: Any) -> Any:
+def equivalent_load(dynamic_rating: Any, life: Any, of: ElementLife = BALLS) -> Any:
     """Load of constant size whose L_10 is this life [N]; ISO 16281:2008."""
-    return dynamic_rating * (MILLION / life) ** (1.0 / 3.0)
+    return dynamic_rating * (MILLION / life) ** float(1 / of.basic)
 
 
 def miner(shares: Iterable[Any], lives: Iterable[Any]) -> Any:

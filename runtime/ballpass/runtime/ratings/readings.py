@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.ratings.life import reference_life, sector_ball_load
+from ballpass.runtime.ratings.life import ElementLife, reference_life, sector_ball_load
 from ballpass.runtime.ratings.of_bearing import Ratings
 
 KILO = 1e3
@@ -42,29 +42,30 @@ class LoadPowers:
 
     Attributes
     ----------
-    cubes : of the third power of the balls' loads, over the balls as well [kN^3]
-    ten_thirds : of the power 10/3 [kN^(10/3)]
-    outer_damage : of the mean over the balls of the power 10/3, to the power 9/10 [kN^3]
-    raceways : of the third power at each place of the outer, then of the inner raceway, over the balls that pass,
-        shape (..., 2, places) ; None where it is not known [kN^3]
+    turning : of the power of the balls' loads that damages a turning ring, over the balls as well; of balls [kN^3]
+    standing : of the power that damages a standing ring; of balls [kN^(10/3)]
+    outer_damage : of the mean over the balls of the latter, to the power that makes damage of it; of balls [kN^3]
+    raceways : of the first power at each place of the outer, then of the inner raceway, over the balls that pass,
+        shape (..., 2, places) ; None where it is not known
     """
 
-    cubes: Any
-    ten_thirds: Any
+    turning: Any
+    standing: Any
     outer_damage: Any
     raceways: Any = None
 
 
-def equivalent_loads(powers: LoadPowers) -> Mapping[str, tuple[Any, Any]]:
+def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[Any, Any]]:
     """Q_ei and Q_ee of every reading [N]; not of `sectors` where the raceways are not known."""
-    cubic = KILO * powers.cubes ** (1.0 / 3.0)
+    root = float(1 / of.turning)
+    inner = KILO * powers.turning**root
     found = {
-        "mean": (cubic, KILO * powers.ten_thirds**0.3),
-        "miner": (cubic, KILO * powers.outer_damage ** (1.0 / 3.0)),
+        "mean": (inner, KILO * powers.standing ** float(1 / of.standing)),
+        "miner": (inner, KILO * powers.outer_damage**root),
     }
     if powers.raceways is not None:
-        outer, inner = (KILO * sector_ball_load(np.moveaxis(powers.raceways[..., k, :], -1, 0)) for k in (0, 1))
-        found["sectors"] = (inner, outer)
+        places = (np.moveaxis(powers.raceways[..., ring, :], -1, 0) for ring in (1, 0))
+        found["sectors"] = tuple(KILO * sector_ball_load(place, of) for place in places)
     return found
 
 
@@ -72,4 +73,6 @@ def lives(ratings: Ratings, powers: LoadPowers) -> dict[str, Any]:
     """Life by every reading [turns], infinite without a load."""
     balls = ratings.inner_ball, ratings.outer_ball
     with np.errstate(divide="ignore"):
-        return {name: reference_life(balls, loads) for name, loads in equivalent_loads(powers).items()}
+        return {
+            n: reference_life(balls, loads, ratings.life) for n, loads in equivalent_loads(powers, ratings.life).items()
+        }

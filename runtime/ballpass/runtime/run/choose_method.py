@@ -72,7 +72,9 @@ def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
     if asked in STEPPERS:
         missing = (
-            "the generated folder has no kernels for it; write it again with `ballpass derive`"
+            f"it does not take this scene: {model.manifest.unfit}"
+            if model.manifest.unfit
+            else "the generated folder has no kernels for it; write it again with `ballpass derive`"
             if model.compiled
             else f"it needs a C compiler, and none was found. {INSTALL_COMPILER}"
         )

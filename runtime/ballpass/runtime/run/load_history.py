@@ -117,8 +117,8 @@ def _history(going: ReducedRun) -> LoadHistory:
     for bearing in manifest.bearings:
         found = load_powers(manifest, bearing, going.row[None, :])
         powers[bearing.prefix] = LoadPowers(
-            cubes=float(found.cubes[0]),
-            ten_thirds=float(found.ten_thirds[0]),
+            turning=float(found.turning[0]),
+            standing=float(found.standing[0]),
             outer_damage=float(found.outer_damage[0]),
             raceways=found.raceways[0],
         )

@@ -234,6 +234,6 @@ def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> L
     layout = reduction_rows(manifest)
     every = [rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS]
     turned = np.where(every[-1] > 0.0, every[-1], np.inf)  # no pass, no damage
-    cubes, more, damage = (power / turned for power in every[:-1])
+    turning, standing, damage = (power / turned for power in every[:-1])
     places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
-    return LoadPowers(cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=places)
+    return LoadPowers(turning=turning, standing=standing, outer_damage=damage, raceways=places)

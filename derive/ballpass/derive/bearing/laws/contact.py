@@ -1,4 +1,4 @@
-"""Hertz contact of a ball between both raceways, Eq. (4), and its smoothed form.
+"""Contact of a rolling element between both raceways, Eq. (4), and its smoothed form.
 
     delta       total deflection of both contacts of the ball [m], positive under load
     delta_rate  its time derivative [m/s]
@@ -9,8 +9,9 @@ a scene gives a half width w, the positive part max(z, 0) becomes, within |z| < 
     ramp(z) = w v^4 (2 v^2 - 6 v + 5),    step(z) = v^3 (6 v^2 - 15 v + 10),    v = (1 + z/w)/2,
 
 with step = d(ramp)/dz.  Outside nothing changes: ramp = max(z, 0), step = 0 or 1 exactly.  ramp is three times
-continuously differentiable, step twice; 0 <= ramp - max(z, 0) <= 5 w/32.  Hertz's law with ramp(delta) for delta_+ is
-never softer, off by at most `SMOOTHED_HERTZ_ERROR` k_b w^1.5, and three times continuously differentiable.
+continuously differentiable, step twice; 0 <= ramp - max(z, 0) <= 5 w/32.  The law k_b delta^n with ramp(delta) for
+delta_+ is never softer, of balls (n = 1.5) off by at most `SMOOTHED_HERTZ_ERROR` k_b w^1.5, and three times
+continuously differentiable.
 
 Damping laws are written with `Contact` and `Rest`, so that each has its smoothed form without a word about it.
 """
@@ -30,20 +31,22 @@ RAMP_ERROR = 5.0 / 32.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Contact of one ball: its stiffness k_b [N/m^1.5] and the half width of its smoothed onset [m], or None."""
+    """Contact of one element: its stiffness k_b, the exponent n of the deflection (of balls 3/2), and the half width of
+    its smoothed onset [m], or None."""
 
     stiffness: sp.Expr
+    exponent: sp.Rational
     width: sp.Expr | None = None
 
     def force(self, delta: sp.Expr) -> sp.Expr:
         """Elastic force, Eq. (4) [N]."""
-        hertz = self.stiffness * delta ** sp.Rational(3, 2)
+        sharp = self.stiffness * delta**self.exponent
         if self.width is None:
-            return sp.Piecewise((hertz, delta > 0), (0, True))
+            return sp.Piecewise((sharp, delta > 0), (0, True))
         v = _within(delta, self.width)
-        # ramp^1.5 with the square root of v^4 taken: no derivative divides by zero at the edge
-        onset = self.stiffness * v**6 * (self.width * (2 * v**2 - 6 * v + 5)) ** sp.Rational(3, 2)
-        return sp.Piecewise((hertz, delta > self.width), (onset, delta > -self.width), (0, True))
+        # ramp^n with the power of v^4 taken apart: no derivative divides by zero at the edge
+        onset = self.stiffness * v ** (4 * self.exponent) * (self.width * (2 * v**2 - 6 * v + 5)) ** self.exponent
+        return sp.Piecewise((sharp, delta > self.width), (onset, delta > -self.width), (0, True))
 
     def slope(self, delta: sp.Expr) -> sp.Expr:
         """Slope of the elastic force [N/m]."""

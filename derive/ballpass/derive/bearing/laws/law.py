@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
-from ballpass.derive.scene.keys import QuantityKey
+from ballpass.derive.scene.keys import Fill, QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import Either, number, read_keys
 from ballpass.derive.scene.table import Table
@@ -43,14 +43,19 @@ class DampingLaw(ABC):
     keys: ClassVar[Mapping[str, QuantityKey]] = MappingProxyType({})
     either: ClassVar[Either | None] = None
 
-    def read(self, table: Table) -> tuple[SceneNumber, ...]:
-        """The law's numbers out of ``[bearing.damping]``; faults are noted."""
-        keys = {name: key.told({"LAW": self.name}) for name, key in self.keys.items()}
+    def read(self, table: Table, fill: Fill) -> tuple[SceneNumber, ...]:
+        """The law's numbers out of ``[bearing.damping]``; faults are noted.
+
+        Parameters
+        ----------
+        fill : texts that the rolling element puts for others, see `RollingElement.fill`
+        """
+        keys = {name: key.told({"LAW": self.name, **fill}) for name, key in self.keys.items()}
         return tuple(number for number in read_keys(table, keys, self.either).values() if number is not None)
 
     @abstractmethod
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
-        """The coefficient from the law's numbers, by key, and the contact stiffness k_b [N/m^1.5]."""
+        """The coefficient from the law's numbers, by key, and the contact stiffness k_b."""
 
     @abstractmethod
     def force(

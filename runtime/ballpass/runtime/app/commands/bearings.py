@@ -46,11 +46,11 @@ def bearings(
             for row in found
         ]
         table = ReportTable(
-            title="Deep groove ball bearings (mm, kN; clearance in µm)",
+            title="Bearings (mm, kN; clearance in µm)",
             heads=heads,
             rows=rows,
             right=heads[1:],
-            caption="Balls, D_w, D_pw: derived from ratings of a catalogue.\n"
+            caption="Balls or rollers, D_w, D_pw: derived from ratings of a catalogue.\n"
             "C_r, C_0r, C_u: from these, by ISO 281 and ISO 76.",
         )
         show_parts(table)
@@ -59,22 +59,27 @@ def bearings(
 def _row(kind: Any) -> dict[str, Any]:
     """A bearing in SI."""
     from ballpass.derive.scene.designations import GROUPS
-    from ballpass.runtime.ratings import load_ratings
+    from ballpass.runtime.ratings.elements import RATED, ElementGeometry
 
     ball, pitch = float(kind.ball_diameter) / 1e3, float(kind.pitch_diameter) / 1e3
-    static = load_ratings.static_rating(kind.balls, ball, pitch)
+    length = {} if kind.length is None else {"length": float(kind.length) / 1e3}
+    element = RATED[kind.element]
+    geometry = ElementGeometry(balls=kind.balls, diameter=ball, pitch=pitch, contact=length)
+    static = element.static_rating(geometry)
     groups = {group: kind.clearance(group) for group in GROUPS}
     return {
         "designation": kind.designation,
         "bore": float(kind.bore) / 1e3,
         "outside_diameter": float(kind.outside) / 1e3,
         "width": float(kind.width) / 1e3,
+        "element": kind.element,
         "balls": kind.balls,
         "ball_diameter": ball,
         "pitch_diameter": pitch,
-        "dynamic_rating": load_ratings.dynamic_rating(kind.balls, ball, pitch),
+        **length,
+        "dynamic_rating": element.dynamic_rating(geometry),
         "static_rating": static,
-        "fatigue_limit": load_ratings.fatigue_limit(static, pitch),
+        "fatigue_limit": element.fatigue_limit(static, pitch),
         "clearance": {group: [end / 1e6 for end in span] for group, span in groups.items() if span is not None},
         "catalogues": {
             rating.maker: {"dynamic": rating.dynamic, "static": rating.static}

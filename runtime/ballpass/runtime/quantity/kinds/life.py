@@ -16,6 +16,7 @@ from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import LOAD_POWERS, SECTORS
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
+from ballpass.runtime.ratings.life import ElementLife
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
 from ballpass.runtime.ratings.readings import KINDS as READINGS_OF
@@ -50,7 +51,8 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     _check(view.manifest, view.numbers.values, quantity)
     bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
     ratings, moved_ratings = _ratings(view, bearing)
-    powers, moved_powers = _powers(_over_passes(view, prefix), quantity, prefix, raceways="sectors" in readings)
+    passes = _over_passes(view, prefix)
+    powers, moved_powers = _powers(passes, quantity, prefix, ratings.life, raceways="sectors" in readings)
     found = lives(ratings, powers)
     shortest = min(readings, key=lambda reading: found[reading])
     notes = (f"of {shortest}",) if len(readings) > 1 else ()
@@ -101,7 +103,9 @@ def _over_passes(view: View, prefix: str) -> View:
     return replace(view, nodes=replace(nodes, weight=weight, weight_slope=weight_slope))
 
 
-def _powers(view: View, quantity: Quantity, prefix: str, *, raceways: bool) -> tuple[LoadPowers, LoadPowers]:
+def _powers(
+    view: View, quantity: Quantity, prefix: str, of: ElementLife, *, raceways: bool
+) -> tuple[LoadPowers, LoadPowers]:
     """Means over the passes of powers of the loads, and the same moved along the directions."""
     signal = view.signals[quantity.channel]
     load = np.maximum(signal.value, 0.0) / KILO
@@ -111,15 +115,18 @@ def _powers(view: View, quantity: Quantity, prefix: str, *, raceways: bool) -> t
         slopes = np.einsum("nb,nbd->nd", power * load ** (power - 1.0), moved)
         return np.mean(load**power, axis=1), slopes / load.shape[1]
 
-    more, more_slope = over_balls(10.0 / 3.0)
-    inverse = np.where(more > 0.0, more, np.inf) ** -0.1
+    more, more_slope = over_balls(float(of.standing))
+    root = float(1 / of.weibull)
+    inverse = np.where(more > 0.0, more, np.inf) ** (root - 1.0)
     duals: dict[str, Dual] = {
-        "cubes": view.mean(*over_balls(3.0)),
-        "ten_thirds": view.mean(more, more_slope),
-        "outer_damage": view.mean(more**0.9, 0.9 * inverse[:, None] * more_slope),
+        "turning": view.mean(*over_balls(float(of.turning))),
+        "standing": view.mean(more, more_slope),
+        "outer_damage": view.mean(more**root, root * inverse[:, None] * more_slope),
     }
     if raceways:
-        values, slopes = zip(*(_raceway(view, load, moved, prefix + place) for place in PLACES), strict=True)
+        values, slopes = zip(
+            *(_raceway(view, load, moved, float(of.turning), prefix + place) for place in PLACES), strict=True
+        )
         duals["raceways"] = np.stack(values), np.stack(slopes)
     return (
         LoadPowers(**{name: value for name, (value, _) in duals.items()}),
@@ -127,8 +134,8 @@ def _powers(view: View, quantity: Quantity, prefix: str, *, raceways: bool) -> t
     )
 
 
-def _raceway(view: View, load: Array, moved: Array, channel: str) -> tuple[Array, Array]:
-    """Mean third power of the load at each place of a raceway, and its derivative."""
+def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) -> tuple[Array, Array]:
+    """Mean power of the load at each place of a raceway, and its derivative."""
     angle = view.signals[channel]
     balls, nodes = load.shape[1], view.nodes
     turns = angle.value / TURN + np.arange(balls) / balls
@@ -142,12 +149,13 @@ def _raceway(view: View, load: Array, moved: Array, channel: str) -> tuple[Array
 
     length, longer = view.length
     scale = SECTORS / (balls * length)
-    cube = load**3
-    given = nodes.weight[:, None] * cube
+    whole = load**power
+    given = nodes.weight[:, None] * whole
     field = scale * summed(given * (1.0 - part), given * part)
     slope = np.zeros((SECTORS, view.directions))
     for k in range(view.directions):
-        amount = nodes.weight_slope[:, [k]] * cube + nodes.weight[:, None] * 3.0 * load**2 * moved[:, :, k]
+        slopes = power * load ** (power - 1.0) * moved[:, :, k]
+        amount = nodes.weight_slope[:, [k]] * whole + nodes.weight[:, None] * slopes
         shift = given * (SECTORS / TURN * angle.slope[:, :, k])
         slope[:, k] = scale * summed(amount * (1.0 - part) - shift, amount * part + shift) - field * longer[k] / length
     return field, slope

@@ -103,9 +103,3 @@ def half_axes(*, kappa: sp.Expr, curvature_sum: sp.Expr, compliance: sp.Expr) ->
 def peak_pressure(major: sp.Expr, minor: sp.Expr) -> sp.Expr:
     """Peak pressure 3 Q/(2 pi a b) over the cube root of the force Q, from `half_axes` [Pa/N^(1/3)]."""
     return 3 / (2 * sp.pi * major * minor)
-
-
-def series_stiffness(inner: sp.Expr, outer: sp.Expr) -> sp.Expr:
-    """Both raceway contacts of a ball in series, Eq. (5) [N/m^1.5]."""
-    exponent = sp.Rational(2, 3)
-    return (inner**-exponent + outer**-exponent) ** sp.Rational(-3, 2)

@@ -1,0 +1,10 @@
+"""Rolling elements, one file each.  A new element is a file and a line here and in the runtime's `ratings.elements`."""
+
+from ballpass.derive.bearing.elements.ball import Ball
+from ballpass.derive.bearing.elements.cylindrical_roller import CylindricalRoller
+from ballpass.derive.bearing.elements.element import RollingElement
+
+#: Elements by their name in the scene file, the usual one first.
+ELEMENTS: dict[str, RollingElement] = {element.name: element for element in (Ball(), CylindricalRoller())}
+
+__all__ = ["ELEMENTS", "RollingElement"]

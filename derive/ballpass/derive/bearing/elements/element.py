@@ -1,0 +1,178 @@
+"""What a rolling element is: keys of its contact in the scene file, and what makes a force of a deflection.
+
+An element is one object in one file of this folder; `ELEMENTS` in ``__init__.py`` lists them.  Ratings, pressure and
+life are the other half: the element of the same name in `ballpass.runtime.ratings.elements`.  In names of parameters
+and channels "ball" stands for any element.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import sympy as sp
+
+from ballpass.derive.scene.bearing_records import Material
+from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.read_keys import Either, keys_of, read_record
+from ballpass.derive.scene.table import Table
+from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.runtime.ratings.elements import RATED, RatedElement
+
+if TYPE_CHECKING:
+    from ballpass.derive.scene.bearing_records import Bearing
+    from ballpass.derive.scene.checker import Checker
+    from ballpass.derive.scene.designations import BearingType
+
+#: What placeholders in the keys of materials stand for.
+RINGS: Fill = MappingProxyType({"PART": "rings", "_OF": ""})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactQuantity:
+    """A quantity of the contact with one ring: what its name ends with, its expression over the force, and words."""
+
+    name: str
+    expression: sp.Expr
+    unit: str
+    description: str
+
+
+class RollingElement(ABC):
+    """A rolling element between two rings.
+
+    Attributes
+    ----------
+    name, noun : what stands in the scene file, and what one is called
+    exponent : of the deflection in the force
+    fill : texts to put for others in keys whose units depend on the exponent
+    derived, given : records of ``[bearing.contact]``: the stiffness follows from geometry and material, or is a number
+    contact_words : what that table holds
+    """
+
+    name: ClassVar[str]
+    noun: ClassVar[str]
+    exponent: ClassVar[sp.Rational]
+    fill: ClassVar[Fill] = MappingProxyType({})
+    derived: ClassVar[type[Any]]
+    given: ClassVar[type[Any]]
+    contact_words: ClassVar[str]
+
+    @property
+    def rated(self) -> RatedElement:
+        """The element as standards rate it."""
+        return RATED[self.name]
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Unit of the stiffness factor."""
+        return self._in_unit("N/m^1.5")
+
+    @property
+    def element_material(self) -> Fill:
+        """What placeholders in the keys of the elements' own material stand for."""
+        return {"PART": f"{self.noun}s", "_OF": "_w"}
+
+    @property
+    def either(self) -> Either:
+        """What gives the stiffness."""
+        geometry = [key for key in keys_of(self.derived) if key not in keys_of(self.given)]
+        return Either(
+            what="the contact stiffness", groups=(("stiffness",), (*geometry, *keys_of(Material))), at="stiffness"
+        )
+
+    def read_contact(self, table: Table) -> Any:
+        """The record of the table ``contact`` of a bearing; faults are noted."""
+        with table.table("contact", self.contact_words) as contact:
+            contact.know(*keys_of(self.derived), *keys_of(self.given), *keys_of(Material), "ball_material")
+            chosen = self.either.choose(contact, keys_of(self.derived) | keys_of(Material) | keys_of(self.given))
+            if chosen == ("stiffness",):
+                return read_record(self.given, contact)
+            contact.missing = contact.missing or not chosen
+            own = None
+            if contact.has("ball_material"):
+                with contact.table("ball_material", "young_modulus and poisson_ratio") as material:
+                    own = read_record(Material, material, self.element_material)
+            return read_record(self.derived, contact, ring=read_record(Material, contact, RINGS), ball=own)
+
+    def fill_contact(self, ball_diameter: object, kind: BearingType) -> Mapping[str, object]:
+        """Keys of the contact that a designation gives, besides steel."""
+        return {}
+
+    @abstractmethod
+    def check(self, checker: Checker, bearing: Bearing) -> None:
+        """Note what numbers of the contact do not fit together."""
+
+    def relations(self, bearing: Bearing) -> Sequence[tuple[str, float, str]]:
+        """What numbers of the contact must be to others, see `values.value_relations`."""
+        return ()
+
+    def stiffness(self, bearing: Bearing, names: Names) -> list[Definition]:
+        """k_b, and for contact from geometry the way to it."""
+        total = f"Stiffness factor of a {self.noun} between both raceways, Eq. (5)"
+        way: list[Definition] = []
+        if isinstance(bearing.contact, self.given):
+            stiffness = symbol_of(bearing.contact.stiffness)
+        else:
+            way, factors = self.ring_stiffnesses(bearing, names)
+            stiffness = self.in_series(factors)
+        return [*way, names.define(names.constant("k_b"), stiffness, self.stiffness_unit, total, "k_b")]
+
+    def in_series(self, factors: Sequence[sp.Expr]) -> sp.Expr:
+        """Stiffness factor of contacts whose deflections add up."""
+        return sum(factor ** (-1 / self.exponent) for factor in factors) ** -self.exponent
+
+    @abstractmethod
+    def ring_stiffnesses(self, bearing: Bearing, names: Names) -> tuple[list[Definition], list[sp.Symbol]]:
+        """Stiffness factors of the contacts with inner and outer ring, and the way to them."""
+
+    @abstractmethod
+    def contact_quantities(
+        self, bearing: Bearing, names: Names, force: sp.Expr
+    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[ContactQuantity]]]:
+        """Pressure, half axes and approach under a force, by ring, and constants they use; none for a given stiffness.
+
+        The constants use those of `stiffness`.
+        """
+
+    def approach(self, ring: str, names: Names, force: sp.Expr) -> ContactQuantity:
+        """Approach of the element and a ring whose stiffness factor `ring_stiffnesses` defines."""
+        factor = names.constant(f"k_{ring[0]}")
+        words = f"Approach of {{}} with the {ring} ring"
+        return ContactQuantity(
+            name="approach", expression=(force / factor) ** (1 / self.exponent), unit="m", description=words
+        )
+
+    def _in_unit(self, text: str) -> str:
+        for old, new in self.fill.items():
+            text = text.replace(old, new)
+        return text
+
+
+def compliance(contact: Any) -> sp.Expr:
+    """(1 - nu^2)/E of ring and element together [1/Pa]."""
+    materials = (contact.ring, contact.ball or contact.ring)
+    return sum(((1 - symbol_of(m.poisson_ratio) ** 2) / symbol_of(m.young_modulus) for m in materials), start=sp.S.Zero)
+
+
+def raceway_radius(ring: str, bearing: Bearing, names: Names) -> Definition:
+    """Radius of a raceway from the bearing's axis."""
+    inner = ring == "inner"
+    ball, pitch = symbol_of(bearing.ball_diameter), symbol_of(bearing.pitch_diameter)
+    return names.define(
+        names.constant(f"{ring}_raceway_radius"),
+        (pitch - (1 if inner else -1) * ball) / 2,
+        "m",
+        f"Radius of the {ring} raceway from the bearing axis, Eq. (7)",
+        "r_b" if inner else "R_b",
+    )
+
+
+def scaled(text: object, ratio: Decimal) -> str | None:
+    """A length written in mm times a ratio, exactly; None where it is written otherwise."""
+    number, _, unit = str(text).partition(" ")
+    return f"{Decimal(number) * ratio} mm" if unit == "mm" and number.replace(".", "", 1).isdigit() else None

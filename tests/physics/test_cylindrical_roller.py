@@ -1,0 +1,254 @@
+"""Claims about cylindrical roller bearings: statics, pressure, ratings, life and motion against other sources."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import fsolve
+
+from ballpass.derive import generate
+from ballpass.derive.bearing.elements.cylindrical_roller import CylindricalRoller
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.scene.designations import bearing_types
+from ballpass.runtime import Model, load
+from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.ratings.elements import RATED, ElementGeometry
+from ballpass.runtime.ratings.elements.cylindrical_roller import dynamic_factor
+from ballpass.runtime.ratings.of_bearing import contacts_of, ratings_of
+
+EXPONENT = 10 / 9
+#: The rotor of the varying compliance in the rollers of an NU205; every roller by Palmgren's formula.
+ROLLERS, DIAMETER, PITCH, LENGTH, LOAD, MASS, DAMPING = 13, 7.5e-3, 39e-3, 8e-3, 196.0, 20.0, 200.0
+ROLLER = (
+    ("balls = 8\n", 'element = "cylindrical-roller"\nballs = 13\n'),
+    ('"7.9375 mm"', '"7.5 mm"'),
+    ('"33.5 mm"', '"39 mm"'),
+    ('stiffness = "13.34e9 N/m^1.5"', 'length = "8 mm"\nyoung_modulus = "207 GPa"\npoisson_ratio = 0.3'),
+)
+TANGENT = ('law = "none"', 'law = "tangent"\nratio = "2.5e-5 s"')
+#: Of a roller between both raceways [N/m^(10/9)].
+STIFFNESS = (2.0 * 3.84e-5 * 1e-3 * 8.0**-0.8) ** -EXPONENT
+CAGE = (1.0 - DIAMETER / PITCH) / 2.0
+
+
+@pytest.fixture(scope="module")
+def rotor(make_model: Callable[..., Model]) -> Model:
+    return make_model("varying_compliance", *ROLLER)
+
+
+def test_stiffness_is_palmgrens_approach_twice(rotor: Model) -> None:
+    """Both contacts of a roller approach by 3.84e-5 Q^0.9/l^0.8 (mm, N)."""
+    constants = rotor.constants()
+    for force in (1.0, 100.0, 5e3):
+        approach = 3.84e-5 * force**0.9 / 8.0**0.8
+        assert 1e3 * (force / constants["bearing.k_i"]) ** 0.9 == pytest.approx(approach, rel=1e-12)
+        assert 1e3 * (force / constants["bearing.k_b"]) ** 0.9 == pytest.approx(2.0 * approach, rel=1e-12)
+
+
+def test_radial_integral_of_a_line_contact(make_model: Callable[..., Model]) -> None:
+    """Zero clearance, many rollers: Z Q_max/F = 1/J_r(0.5) = 4.08, Sjovall's integral with the exponent 10/9."""
+    integral = quad(lambda psi: math.cos(psi) ** (EXPONENT + 1.0), -math.pi / 2.0, math.pi / 2.0)[0] / (2.0 * math.pi)
+    assert 1.0 / integral == pytest.approx(4.08, abs=0.005)
+    count = 100
+    many = (ROLLER[0][0], ROLLER[0][1].replace("13", str(count)))
+    thin = ('"7.9375 mm"', '"1 mm"')
+    model = make_model("varying_compliance", many, thin, *ROLLER[2:])
+    stiffness = model.constants()["bearing.k_b"]
+    place = (LOAD / (count * integral * stiffness)) ** (1.0 / EXPONENT)
+    numbers = model.numbers({"shaft.speed": 0.0})
+    state = np.array([place, 0.0, 0.0, 0.0])
+    rates = model.function("rhs")(0.0, state, model.inputs_at(0.0), numbers.p, numbers.c).full().ravel()
+    assert abs(rates[2]) * MASS < 3e-4 * LOAD  # 100 rollers are nearly a ring of them
+    largest = np.max(model.evaluate(0.0, state, outputs=["ball.force"])["ball.force"])
+    assert count * largest / LOAD == pytest.approx(1.0 / integral, rel=1e-9)
+
+
+def test_hertz_pressure_balances_the_load_and_flattens_the_contact(rotor: Model) -> None:
+    """The semi-elliptic pressure adds up to the load, and pushes the surfaces to the shape that touches (1e-9)."""
+    modulus = 207e9 / (2.0 * (1.0 - 0.3**2))  # of both bodies
+    for sign, contact in zip(
+        (1.0, -1.0), contacts_of(rotor.manifest.bearings[0], rotor.numbers({}).values), strict=True
+    ):
+        force = 1234.0
+        half_length, width = contact.semi_axes(force)
+        peak = contact.peak_pressure(force)
+        assert half_length == pytest.approx(LENGTH / 2.0, rel=1e-15)
+
+        def pressure(x: float, peak: float = peak, width: float = width) -> float:
+            return peak * math.sqrt(max(1.0 - (x / width) ** 2, 0.0))
+
+        total = quad(pressure, -width, width, epsabs=0.0, epsrel=1e-10)[0]
+        assert total * LENGTH == pytest.approx(force, rel=1e-8)
+        # slope of an elastic half plane under it: -2/(pi E*) times the principal value of p(s)/(x - s)
+        x = 0.3 * width
+        value = -quad(pressure, -width, width, weight="cauchy", wvar=x, epsabs=0.0, epsrel=1e-11)[0]
+        curvature = 2.0 / DIAMETER + sign / ((PITCH - sign * DIAMETER) / 2.0)
+        assert 2.0 / (math.pi * modulus) * value == pytest.approx(curvature * x, rel=1e-6)
+
+
+def test_contact_outputs_are_those_of_the_ratings(make_model: Callable[..., Model]) -> None:
+    """Pressure, half width and approach of every roller along a run, against the numeric contact."""
+    outputs = (
+        'outputs = ["inner.*", "ball.*", "load.*"]',
+        'outputs = ["inner.*", "ball.*", "load.*", "ball.inner_*", "ball.outer_*"]',
+    )
+    model = make_model("varying_compliance", *ROLLER, outputs)
+    state = [3e-6, 1e-6, 0.0, 0.0]
+    names = [f"ball.{ring}_{name}" for ring in ("inner", "outer") for name in ("pressure", "half_width", "approach")]
+    found = model.evaluate(0.0, state, outputs=["ball.force", *names])
+    loaded = found["ball.force"] > 0.0
+    assert 0 < loaded.sum() < ROLLERS
+    contacts = contacts_of(model.manifest.bearings[0], model.numbers({}).values)
+    for ring, contact in zip(("inner", "outer"), contacts, strict=True):
+        load = found["ball.force"][loaded]
+        np.testing.assert_allclose(found[f"ball.{ring}_pressure"][loaded], contact.peak_pressure(load), rtol=1e-12)
+        np.testing.assert_allclose(found[f"ball.{ring}_half_width"][loaded], contact.semi_axes(load)[1], rtol=1e-12)
+        np.testing.assert_allclose(found[f"ball.{ring}_approach"][loaded], 3.84e-8 * load**0.9 / 8.0**0.8, rtol=1e-12)
+        assert not found[f"ball.{ring}_pressure"][~loaded].any()
+
+
+def test_dynamic_factor_is_the_standards_table() -> None:
+    """f_c of ISO 281 for rollers, by the formula behind its table, to half of its last digit."""
+    table = {0.05: 74.1, 0.10: 84.2, 0.12: 86.4, 0.16: 88.5, 0.20: 88.7, 0.24: 87.5, 0.30: 83.8}
+    for gamma, factor in table.items():
+        assert dynamic_factor(gamma) == pytest.approx(factor, abs=0.06)
+
+
+@pytest.mark.parametrize("name", ["NU204", "NU205", "NU206"])
+def test_ratings_are_those_of_a_catalogue(name: str) -> None:
+    """C_r and C_0r from the rollers of the table within 0.4 % of NSK's printed ones."""
+    kind = bearing_types()[name]
+    assert kind.length is not None
+    size = {"length": float(kind.length) / 1e3}
+    of = ElementGeometry(
+        balls=kind.balls, diameter=float(kind.ball_diameter) / 1e3, pitch=float(kind.pitch_diameter) / 1e3, contact=size
+    )
+    printed = next(rating for rating in kind.catalogues if rating.maker == "nsk")
+    roller = RATED["cylindrical-roller"]
+    assert roller.dynamic_rating(of) == pytest.approx(printed.dynamic, rel=4e-3)
+    assert roller.static_rating(of) == pytest.approx(printed.static, rel=4e-3)
+    numbers = (roller.dynamic_rating(of), printed.dynamic, roller.static_rating(of), printed.static)
+    row = " | ".join(f"{number:.0f}" for number in numbers)
+    page = Path(__file__).parents[2] / "docs" / "theory" / "rollers.md"
+    assert f"| {name} | {row} |" in page.read_text(encoding="utf-8")
+
+
+def test_static_rating_is_4000_megapascal(rotor: Model) -> None:
+    """The heaviest of Z rollers carries 5/Z of C_0r, and the inner contact has 4000 MPa then (ISO 76), within 2 %."""
+    bearing, values = rotor.manifest.bearings[0], rotor.numbers({}).values
+    heaviest = 5.0 * ratings_of(bearing, values).static / ROLLERS
+    assert contacts_of(bearing, values)[0].peak_pressure(heaviest) == pytest.approx(4000e6, rel=2e-2)
+
+
+def static_forces(angle: float) -> np.ndarray:
+    """Forces of the rollers at rest with the first one at an angle."""
+    psi = angle + 2.0 * np.pi * np.arange(ROLLERS) / ROLLERS
+    cos, sin = np.cos(psi), np.sin(psi)
+
+    def of(place: np.ndarray) -> np.ndarray:
+        return np.asarray(STIFFNESS * np.maximum(place[0] * cos + place[1] * sin, 0.0) ** EXPONENT)
+
+    found = 1e-6 * fsolve(lambda um: [of(1e-6 * um) @ cos - LOAD, of(1e-6 * um) @ sin], [2.4, 0.0], xtol=1e-12)
+    return of(found)
+
+
+def test_life_of_a_constant_load_by_hand(rotor: Model) -> None:
+    """A slowly turning rotor: exponents 4, 4.5 and the Weibull slope 9/8 over static loads; L_10 with 10/3."""
+    speed = 1.0  # [rad/s]: quasi-static, the rotor's own motion is damped away
+    changes = {"shaft.speed": speed, "bearing.inner_ring.damping": 2e3}
+    (found,) = rotor.life(cycles=1.2, transient=0.2, parameters=changes).bearings
+    loads = np.array([static_forces(angle) for angle in np.linspace(0.0, 2.0 * np.pi / ROLLERS, 64, endpoint=False)])
+    gamma = DIAMETER / PITCH
+    rating = 1.1 * dynamic_factor(gamma) * 8.0 ** (7 / 9) * 13**0.75 * 7.5 ** (29 / 27)
+    ratio = (1.038 * ((1.0 - gamma) / (1.0 + gamma)) ** (143 / 108)) ** 4.5
+    inner = rating / (0.378 * 13) * (1.0 + ratio) ** (2 / 9)
+    outer = rating / (0.364 * 13) * (1.0 + 1.0 / ratio) ** (2 / 9)
+    turning = np.mean(loads**4) ** 0.25
+    damage = {
+        "mean": np.mean(loads**4.5) ** (1 / 4.5),
+        "miner": np.mean(np.mean(loads**4.5, axis=1) ** (8 / 9)) ** 0.25,
+    }
+    for reading, standing in damage.items():
+        expected = 1e6 * ((turning / inner) ** 4.5 + (standing / outer) ** 4.5) ** (-8 / 9)
+        assert found.lives[reading] == pytest.approx(expected, rel=2e-4)
+    # each place of the outer raceway meets loads that hardly change, those of the inner one all loads alike
+    assert found.lives["sectors"] == pytest.approx(found.lives["mean"], rel=2e-2)
+    assert found.basic_life == pytest.approx(1e6 * (rating / LOAD) ** (10 / 3), rel=1e-3)
+    assert found.static_safety == pytest.approx(
+        ratings_of(rotor.manifest.bearings[0], rotor.numbers({}).values).static / (13 * np.max(loads) / 5.0), rel=1e-3
+    )
+
+
+def own_run(count: int, cage: float, moments: np.ndarray) -> np.ndarray:
+    """The rotor in its rollers by SciPy; `cage` is their speed over that of the shaft."""
+    psi, speed = 2.0 * np.pi * np.arange(count) / count, 393.1540342298 * math.pi / 30.0 * cage
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        cos, sin = np.cos(psi + speed * t), np.sin(psi + speed * t)
+        force = STIFFNESS * np.maximum(x[0] * cos + x[1] * sin, 0.0) ** EXPONENT
+        return np.array([*x[2:], (LOAD - force @ cos - DAMPING * x[2]) / MASS, -(force @ sin + DAMPING * x[3]) / MASS])
+
+    start, end = [3.9937e-6, 1e-7, 0.0, 0.0], moments[-1]
+    found = solve_ivp(rate, (0.0, end), start, "DOP853", moments, rtol=3e-14, atol=1e-20, max_step=2e-5)
+    return np.asarray(found.y.T)
+
+
+def test_varying_compliance_is_that_of_an_own_model(rotor: Model) -> None:
+    """Motion of the rotor over a roller pass against SciPy, 1e-8 of the motion."""
+    run = rotor.simulate(cycles=0.2, transient=0, rtol=1e-12, samples_per_cycle=400)
+    own = own_run(ROLLERS, CAGE, run.t)
+    assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
+
+
+def test_lanes_and_single_runs_agree(rotor: Model) -> None:
+    """Members of an ensemble are the runs of their parameters."""
+    clearances = [-2e-6, 0.0, 5e-6]
+    wanted = ["max:ball.force", "mean:ball.force", "life", "life_miner"]
+    table = {"bearing.clearance": np.array(clearances)}
+    many = rotor.simulate_many(table, wanted, cycles=0.4, transient=0.1, rtol=1e-8)
+    for k, clearance in enumerate(clearances):
+        one = rotor.simulate_many(
+            {"bearing.clearance": np.array([clearance])}, wanted, cycles=0.4, transient=0.1, rtol=1e-8
+        )
+        for name in wanted:
+            assert many[name][k] == one[name][0]
+
+
+def test_sensitivities_are_verified(make_model: Callable[..., Model]) -> None:
+    """Derivatives of a damped roller bearing, verified by the second route."""
+    model = make_model("varying_compliance", *ROLLER, TANGENT)
+    wrt = ["bearing.clearance", "bearing.contact.length", "load.force.x"]
+    report = model.sensitivity(["mean:ball.force", "max:inner.x", "life"], wrt, cycles=1, transient=0.5)
+    assert all(pair.check.verdict is Verdict.VERIFIED for pair in report.pairs), [
+        (p.quantity, p.parameter, p.check) for p in report.pairs if p.check.verdict is not Verdict.VERIFIED
+    ]
+
+
+def test_exponent_of_a_ball_gives_its_bits(
+    make_model: Callable[..., Model], scene_text: Callable[..., str], tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With 3/2 in the roller's place and the ball's stiffness, every bit of the motion is the ball's."""
+    monkeypatch.setattr(CylindricalRoller, "exponent", sp.Rational(3, 2))
+    text = scene_text("varying_compliance", TANGENT)
+    ball = load(generate(scene_from_text(text, "vc"), tmp_path / "ball")).simulate(cycles=0.2, transient=0)
+    text = text.replace("balls = 8\n", 'element = "cylindrical-roller"\nballs = 8\n')
+    text = text.replace('stiffness = "13.34e9 N/m^1.5"', 'stiffness = "13.34e9 N/m^(10/9)"\nlength = "8 mm"')
+    roller = load(generate(scene_from_text(text, "vc"), tmp_path / "roller")).simulate(cycles=0.2, transient=0)
+    assert roller.statistics.steps == ball.statistics.steps
+    assert np.array_equal(roller.x, ball.x)
+
+
+def test_forty_rollers_are_those_of_an_own_model(make_model: Callable[..., Model]) -> None:
+    """Forty thin rollers, more than lanes of any vector."""
+    forty = ("balls = 8\n", 'element = "cylindrical-roller"\nballs = 40\n')
+    model = make_model("varying_compliance", forty, ('"7.9375 mm"', '"2 mm"'), *ROLLER[2:])
+    run = model.simulate(cycles=0.05, transient=0, rtol=1e-12, samples_per_cycle=400)
+    own = own_run(40, (1.0 - 2.0 / 39.0) / 2.0, run.t)
+    assert run["ball.force"].shape[1] == 40
+    assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
