@@ -1,7 +1,8 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
 Every picture is a figure of ``ballpass run SCENE`` or ``ballpass life SCENE``, copied to
-``docs/images/<scene>_<figure>.png``, but those of `SPECTRA` and `ANSWERS`, which are of commands as the how-to calls them.
+``docs/images/<scene>_<figure>.png``, but those of `SPECTRA` and `ANSWERS`, which are of commands as the how-to calls
+them.
 """
 
 from __future__ import annotations
