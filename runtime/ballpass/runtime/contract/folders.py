@@ -121,3 +121,26 @@ def replace_files(
                     path.rmdir()
         raise
     return result
+
+
+def refuse_full_disk(path: Path, size: float, remedy: str) -> None:
+    """Refuse what the disk of a path, that need not exist, has no room for, before any of it is computed.
+
+    Parameters
+    ----------
+    size : bytes
+
+    Raises
+    ------
+    RequestError
+        It has not.
+    """
+    place = path.absolute()
+    while not place.is_dir():
+        place = place.parent
+    free = shutil.disk_usage(place).free
+    if not size <= free:
+        raise RequestError(
+            f"{path}: {size / 1e9:.3g} GB would be written, and its disk has {free / 1e9:.3g} GB free. Allowed: what "
+            f"fits. {remedy}"
+        )
