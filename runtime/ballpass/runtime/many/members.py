@@ -100,7 +100,8 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
         unit = _unit(given)
         if unit not in ("", units[name]):
             faults.append(
-                f"{name}: values in {unit} were given. Allowed: plain numbers, or values in {units[name]}. Convert them."
+                f"{name}: values in {unit} were given. Allowed: plain numbers, or values in {units[name]}. Convert "
+                "them."
             )
             continue
         try:
