@@ -159,3 +159,14 @@ def test_results_that_stdout_does_not_take_are_a_fault_in_words(words: str, stdo
     assert "Traceback" not in done.stderr
     assert "error: cannot " in done.stderr
     assert "No space left on device" in done.stderr or "Bad file descriptor" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", ["run PIPE", "equations PIPE", "dataset PIPE", 'run "$S" --initial PIPE', "run /dev/zero"]
+)
+def test_pipes_and_devices_are_refused_and_not_waited_for(words: str, tmp_path: Path) -> None:
+    """A pipe without a writer hung, and a device filled the memory."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    done = shell(f'timeout 60 "$B" {words.replace("PIPE", "pipe.toml")}', tmp_path)
+    assert done.returncode == 2
+    assert "this is no regular file" in done.stderr

@@ -131,7 +131,9 @@ def test_a_mechanism_without_bearings_is_explained(tmp_path: Path, monkeypatch: 
     """Its parts add nothing to a right-hand side that there is not: a traceback."""
     text = (ROOT / "scenes/four_bar.toml").read_text(encoding="utf-8")
     scene = tmp_path / "linkage.toml"
-    scene.write_text(text[: text.index("[bearing]")] + "[run]\ncycles = 2\n", encoding="utf-8")
+    scene.write_text(
+        text[: text.index("[bearing]")] + '[run]\ncycles = 2\noutputs = ["reaction.*"]\n', encoding="utf-8"
+    )
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["explain", str(scene), "--json"])
     assert done.exit_code == 0, done.stderr
