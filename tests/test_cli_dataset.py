@@ -102,6 +102,24 @@ def test_faults_of_a_specification_are_told_with_their_place(tmp_path: Path, old
     assert "title (line 1)" in words  # with what else is wrong
 
 
+def test_a_copy_of_a_specification_goes_on_and_another_seed_is_named_alone(tmp_path: Path) -> None:
+    """The name of the file was compared as if it were the scene's content."""
+    text = SPEC.replace('title = "Tight and loose"\n', "").replace("members = 40", "members = 2")
+    text = text.replace("members = 60", "members = 2")
+    target = str(tmp_path / "set.zarr")
+    for name, one in (("set", text), ("copy", text), ("other", text.replace("seed = 7", "seed = 8"))):
+        (tmp_path / f"{name}.toml").write_text(one, encoding="utf-8")
+    done = [
+        CliRunner().invoke(app, ["dataset", str(tmp_path / f"{name}.toml"), "--out", target])
+        for name in ("set", "copy", "other")
+    ]
+    assert [one.exit_code for one in done] == [0, 0, 2], done[1].stderr
+    assert "6 members, 0 made now" in done[1].stdout
+    assert "another specification is there: title was 'set', and is 'other' now; seed was 7, and is 8 now." in (
+        done[2].stderr
+    )
+
+
 def test_requests_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "set.toml"
     path.write_text(SPEC)

@@ -181,6 +181,39 @@ def test_second_call_goes_on_where_the_first_one_ended(
         make_data_set(tmp_path, classes(rotor), noisy, seed=1)
 
 
+@pytest.mark.parametrize("name", ["inner.x/1.0", "noise_rms/0.0", "noise_rms/2.0", "status/1", "time/0", "label/0"])
+@pytest.mark.parametrize("cut", [True, False])
+def test_what_was_deleted_or_cut_is_made_again(rotor: Model, tmp_path: Path, name: str, cut: bool) -> None:
+    """A set with a deleted chunk was complete, with NaN for samples; cut noise ended in a traceback."""
+    path, signals = tmp_path / "set.zarr", replace(SIGNALS, snr=20.0)
+    make_data_set(path, classes(rotor, 3), signals, seed=5, chunk=3)
+    before, content = read(path), (path / name).read_bytes()
+    (path / name).unlink()
+    if cut:
+        (path / name).write_bytes(content[: len(content) // 2])
+    made = make_data_set(path, classes(rotor, 3), signals, seed=5, chunk=3).made
+    assert made == {"time/0": 0, "label/0": 0, "noise_rms/2.0": 1}.get(name, 3)
+    xarray.testing.assert_identical(read(path), before)
+
+
+@pytest.mark.parametrize("name", [".zattrs", ".zmetadata", ".zgroup"])
+def test_a_set_whose_description_is_cut_is_refused_by_name(rotor: Model, tmp_path: Path, name: str) -> None:
+    path = tmp_path / "set.zarr"
+    make_data_set(path, classes(rotor, 1), SIGNALS, seed=5)
+    (path / name).write_bytes((path / name).read_bytes()[:3])
+    with pytest.raises(RequestError, match=r"set\.zarr: what describes the data set .* cannot be read"):
+        make_data_set(path, classes(rotor, 1), SIGNALS, seed=5)
+
+
+def test_a_set_that_fits_nowhere_is_refused_and_leaves_nothing(rotor: Model, tmp_path: Path) -> None:
+    for rate, members, words in ((1e12, 1, "would not fit into memory"), (1e6, 10_000_000, "GB would be written")):
+        with pytest.raises(RequestError, match=words):
+            make_data_set(
+                tmp_path / "set.zarr", classes(rotor, members)[:1], replace(SIGNALS, sample_rate=rate), seed=1
+            )
+    assert not list(tmp_path.iterdir())
+
+
 def test_netcdf_holds_what_zarr_holds(rotor: Model, tmp_path: Path) -> None:
     for name in ("a.zarr", "a.nc"):
         make_data_set(tmp_path / name, classes(rotor), SIGNALS, seed=1, chunk=4)

@@ -10,7 +10,10 @@ from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
+import pandas
+import pint
 import pytest
+import xarray
 from press_laws import press
 
 from ballpass.runtime import Model, RequestError, SimulationError
@@ -565,3 +568,20 @@ def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouch
     assert np.array_equal(x[-1], members.initial[-1])
     assert np.all(status[:-1] == End.DONE)
     assert np.array_equal(x[:-1], reached[:-1])
+
+
+def test_values_that_say_another_unit_are_refused(make_model: Callable[..., Model]) -> None:
+    """An array of xarray in rpm was taken for rad/s: 6726 N where 4418 N are right."""
+    model, name, unit = make_model("varying_compliance"), "shaft.speed", pint.UnitRegistry()
+    plain = model.simulate_many({name: [41.0, 42.0]}, "rms:inner.y", cycles=22)["rms:inner.y"]
+    right = (
+        xarray.DataArray([41.0, 42.0], attrs={"units": "rad/s"}),
+        np.array([41.0, 42.0]) * unit.rad / unit.s,
+        xarray.DataArray([41.0, 42.0]),
+    )
+    tables: list[Any] = [{name: column} for column in right] + [pandas.DataFrame({name: [41.0, 42.0]})]
+    for table in tables:
+        np.testing.assert_array_equal(model.simulate_many(table, "rms:inner.y", cycles=22)["rms:inner.y"], plain)
+    for column in (xarray.DataArray([392.0], attrs={"units": "rpm"}), np.array([392.0]) * unit.rpm):
+        with pytest.raises(RequestError, match=r"shaft\.speed: values in rpm were given.*values in rad/s"):
+            model.simulate_many({name: column}, "rms:inner.y", cycles=22)

@@ -127,6 +127,19 @@ def test_shares_of_the_right_hand_side_and_the_rest_are_all_of_it(
         assert rest + sum(shares) == report["functions"]["rhs"]["operations"]
 
 
+def test_a_mechanism_without_bearings_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its parts add nothing to a right-hand side that there is not: a traceback."""
+    text = (ROOT / "scenes/four_bar.toml").read_text(encoding="utf-8")
+    scene = tmp_path / "linkage.toml"
+    scene.write_text(
+        text[: text.index("[bearing]")] + '[run]\ncycles = 2\noutputs = ["reaction.*"]\n', encoding="utf-8"
+    )
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["explain", str(scene), "--json"])
+    assert done.exit_code == 0, done.stderr
+    assert json.loads(done.stdout)["states"] == []
+
+
 def test_hertz_is_not_called_smooth_where_people_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["explain", str(ROOT / "scenes/varying_compliance.toml")])

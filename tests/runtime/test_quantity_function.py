@@ -5,6 +5,7 @@ JAX's and PyTorch's own checkers compare the derivatives with differences of the
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -319,3 +320,17 @@ def test_a_missing_package_is_named_with_the_command(package: str, monkeypatch: 
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ModuleNotFoundError, match=rf"pip install 'ballpass\[{package}\]'"):
         import_module(f"ballpass.{package}")
+
+
+def test_a_function_that_has_differentiated_can_be_pickled(make_model: Callable[..., Model]) -> None:
+    """As joblib and SciPy's workers do; what runs had left to be taken up again could not be."""
+    function = QuantityFunction(make_model("varying_compliance"), "rms:inner.y", ["shaft.speed"], cycles=22)
+    slope = function.jacobian(function.start)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(function)).jacobian(function.start), slope)
+
+
+def test_nan_among_the_parameters_is_nan_with_a_warning(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    function = QuantityFunction(model, "rms:inner.y", ["shaft.speed"], cycles=22, failed="nan")
+    with pytest.warns(UnknownValueWarning, match=r"a parameter is no finite number \(shaft.speed = nan\)"):
+        assert np.isnan(function([np.nan]))

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
@@ -43,13 +44,13 @@ def source_key(path: Path) -> str:
         The file cannot be read.
     """
     digest = hashlib.sha256(repr((mf.SCHEMA, path.stem, _sources(), versions())).encode())
-    text = path.read_bytes().replace(b"\r\n", b"\n")
+    text = read_file(path).replace(b"\r\n", b"\n")
     digest.update(text)
     if b"file" in text:
         with contextlib.suppress(ValueError):  # a file that is not TOML has no digest
             for name in named_files(tomllib.loads(text.decode("utf-8-sig"))):
                 with contextlib.suppress(OSError, ValueError):  # reading the scene reports the fault
-                    digest.update((path.parent / name).read_bytes().replace(b"\r\n", b"\n"))
+                    digest.update(read_file(path.parent / name).replace(b"\r\n", b"\n"))
     return digest.hexdigest()
 
 

@@ -32,6 +32,7 @@ from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names
+from ballpass.runtime.contract.folders import read_file
 
 T = TypeVar("T", Bearing, Load)
 
@@ -79,16 +80,13 @@ def read_scene(
     """
     file = Path(path)
     try:
-        with file.open("rb") as stream:
-            data = stream.read(MAX_FILE_SIZE + 1)
+        data = read_file(file, MAX_FILE_SIZE)
     except OSError as error:
         raise _unreadable(
             file, error.strerror or type(error).__name__, "give the path of a scene file (TOML)"
         ) from None
     except ValueError:  # a NUL in the path
         raise _unreadable(file, "this is not a path", "give the path of a scene file (TOML)") from None
-    if len(data) > MAX_FILE_SIZE:
-        raise _unreadable(file, f"the file is larger than {MAX_FILE_SIZE} bytes", "give a scene file (TOML)")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

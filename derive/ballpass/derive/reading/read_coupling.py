@@ -72,9 +72,9 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
             allowed='nothing but body with coupling = "two-way"',
             remedy="delete the key",
         )
-        if joint is None:
+        moving = [body for body in joint.bodies if body != FRAME] if joint is not None else []
+        if joint is None or not moving:  # what is wrong with its bodies was said where it was read
             return str(BODY.read(ring, "body")) if ring.has("body") else ""
-        moving = [body for body in joint.bodies if body != FRAME]
         if not ring.has("body"):
             if len(moving) == 1:
                 return moving[0]

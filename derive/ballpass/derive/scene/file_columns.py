@@ -16,6 +16,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ballpass.derive.scene.errors import Fault
+from ballpass.runtime.contract.folders import read_file
+
+#: Bytes of a file of columns at most.
+LARGEST = 100_000_000
 
 #: Most rows: each is a parameter of the model, with a derivative of its own.
 MOST_ROWS = 1000
@@ -84,7 +88,7 @@ def _named(name: str, wanted: str, known: Sequence[str]) -> None:
 
 def _of_csv(file: Path, name: str, wanted: str) -> list[float]:
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        text = read_file(file, LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "it is not text in UTF-8"
         _refuse(f"the file cannot be read: {why}", name, "a CSV file", "give its path from the scene file's folder")

@@ -309,13 +309,18 @@ class ChoiceKey(Key):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextKey(Key):
-    """A text; empty, with a fault, where there is none.  With `longest`, one line of at most as many characters."""
+    """A text; empty, with a fault, where there is none.  With `longest`, one line of at most as many characters.
+
+    Empty is what stands for a text that is missing or wrong, and is checked no further: a text that is written may be
+    empty only where that is the default.
+    """
 
     longest: int = 0
 
     def schema(self) -> dict[str, Any]:
         """A text."""
-        return {"type": "string", **({"maxLength": self.longest} if self.longest else {})}
+        least = {} if self.default == "" else {"minLength": 1}
+        return {"type": "string", **least, **({"maxLength": self.longest} if self.longest else {})}
 
     def placeholder(self, table: Table, name: str) -> str:
         """Nothing."""
@@ -325,6 +330,8 @@ class TextKey(Key):
         """The text."""
         if not isinstance(given, str):
             return self.refuse(table, name, "this is not a text", given, "a text")
+        if not given.strip() and self.default != "":
+            return self.refuse(table, name, "the text is empty", given, "a text that is not empty")
         if self.longest and (not given.isprintable() or len(given) > self.longest):
             allowed, remedy = f"at most {self.longest} printable characters", "shorten it; put the rest into a comment"
             return self.refuse(table, name, "this is not a single line", given, allowed, remedy)

@@ -2,24 +2,25 @@
 
 An interrupt (Ctrl-C) ends it with exit code 130, also while modules are imported or objects destroyed, where Python
 turns an interrupt into other faults or into a remark.  One that comes when all is done changes nothing.
+
+Results that stdout does not take are a fault (exit code 2), as are files that cannot be written; a reader who has seen
+enough (``| head``) is none, and ends it with exit code 1.
 """
 
 from __future__ import annotations
 
-import io
 import signal
 import sys
 import threading
 from types import FrameType
 
+from ballpass.runtime.app import streams
 from ballpass.runtime.app.interrupted import has_said, say_interrupted
 
 
 def main() -> None:
     """Import the command line and run it."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # ASCII has no µ, and pipes of Windows no rules of tables
+    streams.prepare()
     interrupted = False
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -39,7 +40,16 @@ def main() -> None:
     try:
         from ballpass.runtime.app.cli import app
 
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
+    except OSError as fault:  # of stdout: commands handle those of files
+        streams.give_up_stdout()
+        if isinstance(fault, BrokenPipeError):
+            sys.exit(1)
+        print(f"error: cannot write the results to stdout: {fault.strerror or fault}.", file=sys.stderr)
+        sys.exit(2)
     except BaseException as end:
         if not interrupted or (isinstance(end, SystemExit) and not end.code):
             raise

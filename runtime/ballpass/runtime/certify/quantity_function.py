@@ -15,7 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Literal, NoReturn, TypeVar
+from typing import Any, Literal, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -131,6 +131,10 @@ class QuantityFunction:
         self._all = tuple(range(len(self.of)))
         self._said: set[tuple[type[BallpassWarning], str]] = set()
         resolve(model, numbers, self._request).check_steady()  # a wrong length is refused now
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what runs have left to be taken up again, which is of this process."""
+        return {**self.__dict__, "_free": defaultdict(list)}
 
     def __repr__(self) -> str:
         return f"QuantityFunction({self._model.manifest.scene}: {_some(self.of)} by {_some(self.wrt)})"
@@ -290,7 +294,11 @@ class QuantityFunction:
         given = np.asarray(x, dtype=float)
         self.check_shape(given.shape)
         rows = given.reshape(-1, len(self.wrt))
-        able = np.flatnonzero(np.isfinite(rows).all(axis=1) | (self._failed == "raise"))
+        finite = np.isfinite(rows).all(axis=1)
+        able = np.flatnonzero(finite | (self._failed == "raise"))
+        if self._failed == "nan" and len(able) < len(rows):
+            row = rows[np.flatnonzero(~finite)[0]]
+            self._warn(UnknownValueWarning, [(name, row, "a parameter is no finite number") for name in self.of])
         return rows, able, given.shape[:-1]
 
     def _numbers(self, row: Array) -> Numbers:

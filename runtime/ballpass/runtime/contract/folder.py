@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ballpass.runtime.contract.errors import ArtefactError
-from ballpass.runtime.contract.folders import read_whole, replace_file
+from ballpass.runtime.contract.folders import read_file, read_whole, replace_file
 from ballpass.runtime.contract.manifest import FILE_NAME, Manifest
 
 
@@ -68,7 +68,7 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     """
     path = Path(folder) / FILE_NAME
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_file(path).decode()
     except (FileNotFoundError, NotADirectoryError) as fault:
         what = "the folder has no" if Path(folder).is_dir() else "there is no folder with a"
         raise ArtefactError(
@@ -124,7 +124,7 @@ def read_unchanged(path: Path, digest: str) -> bytes:
         The folder was written anew, or edited, since the model was loaded.
     """
     try:
-        content = path.read_bytes()
+        content = read_file(path)
     except OSError as fault:
         raise ArtefactError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
     if hashlib.sha256(content).hexdigest() != digest:
@@ -137,4 +137,4 @@ def read_unchanged(path: Path, digest: str) -> bytes:
 
 def file_digest(path: str | Path) -> str:
     """sha256 of a file's bytes, hexadecimal."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    return hashlib.sha256(read_file(path)).hexdigest()

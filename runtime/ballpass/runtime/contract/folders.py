@@ -8,8 +8,10 @@ fit, and readers refuse the folder.  Files of others are not touched.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
@@ -25,6 +27,9 @@ NEW = ".ballpass-new-"
 
 #: How long a process waits for another one that writes into the same folder [s].
 PATIENCE = 300.0
+
+#: Largest file that is read as a whole; solutions may be large.
+MOST_BYTES = 2**36
 
 _Content = TypeVar("_Content")
 
@@ -121,3 +126,46 @@ def replace_files(
                     path.rmdir()
         raise
     return result
+
+
+def refuse_full_disk(path: Path, size: float, remedy: str) -> None:
+    """Refuse what the disk of a path, that need not exist, has no room for, before any of it is computed.
+
+    Parameters
+    ----------
+    size : bytes
+
+    Raises
+    ------
+    RequestError
+        It has not.
+    """
+    place = path.absolute()
+    while not place.is_dir():
+        place = place.parent
+    free = shutil.disk_usage(place).free
+    if not size <= free:
+        raise RequestError(
+            f"{path}: {size / 1e9:.3g} GB would be written, and its disk has {free / 1e9:.3g} GB free. Allowed: what "
+            f"fits. {remedy}"
+        )
+
+
+def read_file(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Content of a regular file: a pipe or device would be waited for, or read without end.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, is no regular file, or is larger than `most` bytes.
+    """
+    opened = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(opened, "rb", closefd=True) as stream:
+        found = os.fstat(opened)
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "this is no regular file", str(path))
+        if found.st_size > most:
+            raise OSError(errno.EFBIG, f"the file is larger than {most} bytes", str(path))
+        return stream.read()

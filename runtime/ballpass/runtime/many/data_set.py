@@ -4,8 +4,8 @@ In: classes of signals, what is recorded, a seed, a file.  Out: Zarr or NetCDF, 
 
 Members are made in chunks, by this process or by the workers of a cluster.  A worker that sees the store writes its
 samples there, another one sends them; this process notes that a chunk is there.  What a process that ended has left
-unfinished is made again, the rest is not.  NetCDF is written from the finished Zarr, for HDF5 does not survive the end
-of a process that writes.
+unfinished, or what has been deleted or cut since, is made again; the rest is not.  NetCDF is written from the finished
+Zarr, for HDF5 does not survive the end of a process that writes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.folders import locked
+from ballpass.runtime.contract.folders import locked, refuse_full_disk
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure
@@ -35,6 +35,7 @@ from ballpass.runtime.many.data_set_store import (
     create_store,
     is_complete,
     marked,
+    mend,
     open_store,
     read_failures,
     read_finished,
@@ -49,6 +50,7 @@ from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, 
 from ballpass.runtime.many.spall_entries import entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import quantities_of, quantity_words
+from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
@@ -181,6 +183,7 @@ def make_data_set(
     """
     need("zarr")
     _check(classes, signals, seed, chunk)
+    _check_room(Path(path), classes, signals)
     table = _draw(classes, signals, seed)
     fits = CHUNK_BYTES // (signals.samples * np.dtype(signals.precision).itemsize)
     count = len(table.kinds)
@@ -192,13 +195,15 @@ def make_data_set(
         return DataSetReport(path=target, members=len(table.kinds), made=0, failures=read_finished(target, spec))
     store = target.with_name(f"{target.name}.parts") if netcdf else target
     refuse_foreign(store)
+    axes = _axes(classes, signals, table, spec, size)
     store.mkdir(parents=True, exist_ok=True)
     with locked(store):
         if is_complete(store):
             group = open_store(store)
             refuse_changed(store, dict(group.attrs), spec)
+            mend(group, axes)
         else:
-            group = create_store(store, _axes(classes, signals, table, spec, size))
+            group = create_store(store, axes)
         with marked(store) as place, shown("making signals", progress) as tell:
             made = _fill(place, classes, signals, seed, table, size, client, tell)
         failures = read_failures(group)
@@ -230,6 +235,14 @@ def _check(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: i
         raise RequestError("\n".join(faults))
     for one in classes:
         check_outputs(one.model, signals, one.label)
+
+
+def _check_room(target: Path, classes: Sequence[SignalClass], signals: Signals) -> None:
+    """Refuse a data set that fits neither into memory, a member at a time, nor on the disk."""
+    less = "Record shorter, or at a lower sample_rate."
+    check_memory(f"Signals of {signals.samples:.10g} samples of", signals.samples, len(signals.outputs) + 1, less)
+    number = np.dtype(signals.precision).itemsize * len(signals.outputs)
+    refuse_full_disk(target, number * signals.samples * sum(one.members for one in classes), f"Fewer members. {less}")
 
 
 def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _DataSetTable:
@@ -268,7 +281,8 @@ def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: in
                 "scene": {info.name: info.default for info in one.model.manifest.parameters},
                 "rtol": one.model.manifest.run.rtol,
                 "method": one.model.manifest.run.method,
-                "files": dict(one.model.manifest.files),
+                # words for people have the scene's name in them, and a data set does not depend on names of files
+                "files": {name: digest for name, digest in one.model.manifest.files if not name.endswith(".md")},
             }
             for one in classes
         },

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
@@ -101,8 +102,14 @@ class SignalAxes:
 
 
 def open_store(path: str | Path) -> Any:
-    """A store that there is."""
-    return need("zarr").open_group(path, mode="r+", zarr_format=2)
+    """A store that there is; RequestError where what describes it cannot be read."""
+    try:
+        return need("zarr").open_group(path, mode="r+", zarr_format=2)
+    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise RequestError(
+            f"{path}: what describes the data set (.zmetadata, .zattrs) cannot be read ({fault}): cut short, or "
+            "edited. Allowed: a data set as it was written. Take these files from a copy, or delete the folder."
+        ) from None
 
 
 def is_complete(store: Path) -> bool:
@@ -125,28 +132,12 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
             data=values,
             chunks=(chunk or values.shape[0], *values.shape[1:]),
             fill_value=None,  # xarray would make NaN of zeros
+            compressors=None if chunk else "auto",  # `mend` knows the length of a chunk
             attributes=facts | ({"units": unit} if unit else {}),
         )
 
-    array("member", "member", np.arange(count), "number of the member", "1")
-    array("time", "time", axes.times, "time from the start of the run", "s")
-    array("label", "member", axes.labels, "class of the member")
-    for name, dimension, rows in (
-        ("parameter", "parameter", axes.names),
-        ("output", "output", axes.outputs),
-        ("quantity", "quantity", axes.quantities),
-    ):
-        if not rows:
-            continue
-        names, units, meanings = (np.array(column) for column in zip(*rows, strict=True))
-        array(name, dimension, names, f"name of the {name}")
-        array(f"{name}_unit", dimension, units, f"SI unit of the {name}")
-        array(f"{name}_meaning", dimension, meanings, f"what the {name} is")
-    array("parameters", "member parameter", axes.parameters, "parameters of the run; NaN: its class has none such")
-    array("snr", "member", axes.snr, "ratio of signal to noise", "dB")
-    for name, times in axes.entries.items():
-        meaning = f"times in the record at which a ball reaches {name}; NaN behind the last"
-        array(f"entry_time.{name}", f"member entry.{name}", times, meaning, "s")
+    for row in _known_arrays(axes):
+        array(*row)
     noise = np.full((count, len(axes.outputs)), np.nan)
     array("noise_rms", "member output", noise, "rms of the noise, in the unit of the output", chunk=size)
     if axes.quantities:
@@ -167,6 +158,70 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
     group["status"].attrs.update({"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)})
     zarr.consolidate_metadata(group.store, zarr_format=2)
     return open_store(path)
+
+
+def _known_arrays(axes: SignalAxes) -> Iterator[tuple[str, str, np.ndarray, str, str]]:
+    """Arrays that are known before anything is simulated: name, dimensions, values, meaning, unit."""
+    yield "member", "member", np.arange(len(axes.labels)), "number of the member", "1"
+    yield "time", "time", axes.times, "time from the start of the run", "s"
+    yield "label", "member", axes.labels, "class of the member", ""
+    for name, rows in (("parameter", axes.names), ("output", axes.outputs), ("quantity", axes.quantities)):
+        if not rows:
+            continue
+        names, units, meanings = (np.array(column) for column in zip(*rows, strict=True))
+        yield name, name, names, f"name of the {name}", ""
+        yield f"{name}_unit", name, units, f"SI unit of the {name}", ""
+        yield f"{name}_meaning", name, meanings, f"what the {name} is", ""
+    yield "parameters", "member parameter", axes.parameters, "parameters of the run; NaN: its class has none such", ""
+    yield "snr", "member", axes.snr, "ratio of signal to noise", "dB"
+    for name, times in axes.entries.items():
+        meaning = f"times in the record at which a ball reaches {name}; NaN behind the last"
+        yield f"entry_time.{name}", f"member entry.{name}", times, meaning, "s"
+
+
+def mend(group: Any, axes: SignalAxes) -> None:
+    """Write again what is known and was deleted, cut or edited since; chunks of signals without files are unfinished.
+
+    A file of samples counts by its length, which is known because samples are not compressed.
+    """
+    for name, _, values, _, _ in _known_arrays(axes):
+        found = _readable(group, name)
+        if found is None or not np.array_equal(found, values, equal_nan=values.dtype.kind == "f"):
+            group[name][:] = values
+    folder = Path(group.store.root)
+    quantities = ["quantities"] if axes.quantities else []
+    names = [*(name for name, _, _ in axes.outputs), *quantities, "noise_rms", "failure", "status"]
+    for number, first in enumerate(range(0, len(axes.labels), axes.chunk)):
+        which = slice(first, first + axes.chunk)
+        places = {name: folder / name / ".".join(map(str, (number, *[0] * (group[name].ndim - 1)))) for name in names}
+        if not _is_whole(group, axes, which, places):
+            for place in places.values():
+                place.unlink(missing_ok=True)
+            group["status"][which] = np.full(len(axes.labels[which]), UNFINISHED, np.int8)
+
+
+def _readable(group: Any, name: str) -> Any:
+    """Values of an array; None where its files cannot be decoded."""
+    try:
+        return group[name][:]
+    except (OSError, ValueError, RuntimeError, TypeError):  # what codecs raise of a file that is cut
+        return None
+
+
+def _is_whole(group: Any, axes: SignalAxes, which: slice, places: Mapping[str, Path]) -> bool:
+    """Whether all there is to a chunk is there; its files by the names of the arrays."""
+    lengths = {name: place.stat().st_size for name, place in places.items() if place.is_file()}
+    for name, length in lengths.items():
+        array = group[name]
+        if length != math.prod(array.chunks) * array.dtype.itemsize:
+            return False
+    status = group["status"][which] if "status" in lengths else np.array([UNFINISHED])
+    made = [*(name for name, _, _ in axes.outputs), *(["quantities"] if axes.quantities else [])]
+    wanted = made if np.any(status == MADE) else []
+    # what holds nothing but zeros or empty words has no file
+    wanted += ["noise_rms"] if wanted and np.any(np.isfinite(axes.snr[which])) else []
+    wanted += ["failure"] if np.any(status == FAILED) else []
+    return all(name in lengths for name in wanted)
 
 
 def write_samples(group: Any, first: int, made: Made) -> None:
@@ -217,10 +272,14 @@ def refuse_foreign(store: Path) -> None:
 
 def refuse_changed(place: Path, facts: Mapping[str, Any], spec: Mapping[str, Any]) -> None:
     """Refuse to go on with a data set of another specification."""
-    before = json.loads(facts["ballpass_spec"]) if facts.get("ballpass_data_set") == SCHEMA else None
-    if before is None:
+    try:
+        before = json.loads(facts["ballpass_spec"]) if facts.get("ballpass_data_set") == SCHEMA else None
+    except (KeyError, TypeError, ValueError):
+        before = None
+    if not isinstance(before, Mapping):
         raise RequestError(f"{place}: this is no data set of this version of ballpass. Give a place that is new.")
-    if before != spec:
+    # the title is words; by default it is the name of a file
+    if {**before, "title": ""} != {**spec, "title": ""}:
         raise RequestError(
             f"{place}: a data set of another specification is there: {_changes(before, spec)}. It is as it was. Give a "
             "place that is new, or delete it."

@@ -59,7 +59,8 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     Parameters
     ----------
     table : mapping from name to one number for each member; or one mapping for each member, where what a member does
-        not name keeps its default; or a structured array
+        not name keeps its default; or a structured array, or a table of pandas.  Values that say their unit are
+        refused where it is not SI
 
     Raises
     ------
@@ -67,7 +68,10 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
         Unknown names, columns of unequal length, values that are not finite numbers; all faults at once.
     """
     defaults = {info.name: info.default for info in manifest.parameters}
+    units = {info.name: info.unit for info in manifest.parameters}
     raw: dict[str, object] = {}
+    if hasattr(table, "columns") and hasattr(table, "to_dict"):  # a table of pandas
+        table = {str(name): table[name] for name in table.columns}
     if isinstance(table, np.ndarray):
         if table.dtype.names is None or table.ndim != 1:
             raise RequestError(
@@ -93,10 +97,17 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
         if name not in defaults:
             faults.append(unknown_name("parameter", name, defaults))
             continue
+        unit = _unit(given)
+        if unit not in ("", units[name]):
+            faults.append(
+                f"{name}: values in {unit} were given. Allowed: plain numbers, or values in {units[name]}. Convert "
+                "them."
+            )
+            continue
         try:
-            column = np.array(given, dtype=float)
+            column = np.array(getattr(given, "magnitude", given), dtype=float)
             # NumPy takes truth values and texts for numbers
-            plain = _plain(given)
+            plain = _plain(getattr(given, "magnitude", given))
         except (TypeError, ValueError, OverflowError):
             plain = False
         if not plain:
@@ -119,6 +130,17 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     if faults:
         raise RequestError("\n".join(faults))
     return columns
+
+
+def _unit(given: object) -> str:
+    """Unit that an array of xarray or pint says of itself, as a scene would have it; empty for plain numbers."""
+    said = getattr(given, "units", None)  # of pint
+    if said is None:
+        said = getattr(given, "attrs", {}).get("units")  # of xarray
+    if said is None:
+        return ""
+    text = f"{said:~}" if hasattr(said, "dimensionality") else str(said)  # pint's symbols
+    return text.replace(" ", "") or "1"
 
 
 def _plain(given: object) -> bool:

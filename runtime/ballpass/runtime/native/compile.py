@@ -34,6 +34,7 @@ import platformdirs
 from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER
+from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 
@@ -188,7 +189,7 @@ def _content(path: Path, digests: Mapping[Path, str]) -> bytes:
     if path in digests:
         return read_unchanged(path, digests[path])
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as fault:
         raise CompileError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
 
@@ -247,7 +248,7 @@ def _open(path: Path, command: str) -> None:
 
 def _digest(path: Path) -> str:
     """Digest of a file in the name of a library: 16 hexadecimal figures of its sha256."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(read_file(path)).hexdigest()[:16]
 
 
 def _clear(folder: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.run.netcdf import SEAL_LENGTH, seal
 from ballpass.runtime.run.reductions import Reductions
@@ -35,7 +36,7 @@ def load_solution(path: str | Path) -> Solution:
     'Punching machine of the paper'
     """
     try:
-        content = Path(path).read_bytes()
+        content = read_file(path)
     except FileNotFoundError:
         raise RequestError(f"{path}: there is no such file. `Solution.save` and `ballpass run` write one.") from None
     except (OSError, ValueError) as fault:  # a folder, no permission; no path

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import refuse_full_disk
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
@@ -57,7 +58,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
     begin = start_time(request.initial)
     length = run_length(model, request, turn)
     check_length(begin + length, turn)
-    edges = _edges(model, request, rate, begin, begin + length, piece)
+    edges = _edges(model, request, path, rate, begin, begin + length, piece)
     try:
         with _replaced(path) as made:
             statistics = _write(model, numbers, request, made, rate, edges)
@@ -70,13 +71,17 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
     return statistics
 
 
-def _edges(model: LoadedModel, request: Request, rate: float, begin: float, end: float, piece: int) -> list[int]:
-    """Numbers of the samples with which pieces begin, and the one behind the last."""
+def _edges(
+    model: LoadedModel, request: Request, path: Path, rate: float, begin: float, end: float, piece: int
+) -> list[int]:
+    """Numbers of the samples with which pieces begin, and the one behind the last; refused where no disk holds them."""
     first, behind = int(np.ceil(begin * rate - 1e-6)), int(np.floor(end * rate + 1e-6)) + 1
     if behind - first < 2:
         raise RequestError(f"sample_rate: {rate:g} Hz has fewer than two samples within the run. Give a higher rate.")
     wanted = set(model.outputs if request.outputs is None else request.outputs)
     columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
+    bytes_of_all = 8.0 * (columns + 1) * (behind - first)
+    refuse_full_disk(path, bytes_of_all, "Give a lower sample_rate, a shorter run, or fewer outputs.")
     rows = max(piece // (columns + len(model.manifest.inputs)), 2)
     edges = list(range(first, behind, rows))
     return [*(edges[:-1] if len(edges) > 1 and behind - edges[-1] < 2 else edges), behind]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.many.distributions import Distribution, shape_names
 from ballpass.runtime.many.signals import PRECISIONS, Signals
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 #: Largest seed, as long as integers of most programs.
 MOST_SEED = 2**63 - 1
+
+#: Bytes of a specification at most.
+LARGEST_SPEC = 10_000_000
 
 #: Most members of a class.
 MOST_MEMBERS = 10_000_000
@@ -70,7 +74,7 @@ def read_spec(path: Path) -> DataSetSpec:
     from ballpass.derive.scene.toml_lines import index_lines
 
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_file(path, LARGEST_SPEC).decode("utf-8-sig")
         data = tomllib.loads(text)
     except (OSError, ValueError) as fault:
         problem = f"the file cannot be read: {getattr(fault, 'strerror', None) or fault}"

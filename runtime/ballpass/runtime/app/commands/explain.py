@@ -61,7 +61,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
     kernels = {k.removeprefix("kernel."): v for k, v in counted.functions.items() if k.startswith("kernel.")}
     named = features(scene)
     # operations that the parts do not add by themselves are those of the contacts
-    shares = [(part.path, counted.added[part.name]["rhs"]) for part in named if part.name in counted.added]
+    shares = [(part.path, counted.added[part.name].get("rhs", 0)) for part in named if part.name in counted.added]
     parts: list[dict[str, Any]] = []
     contacts = [f"{bearing.path}.contact" for bearing in scene.bearings]
     for part in named:

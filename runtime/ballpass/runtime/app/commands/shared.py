@@ -104,6 +104,9 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
         why = error.strerror or str(error)
         complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
         raise typer.Exit(2) from None
+    except MemoryError:
+        complain("there is not enough memory for this. Ask for less: fewer members, fewer samples or a shorter run.")
+        raise typer.Exit(1) from None
     except KeyboardInterrupt:
         say_interrupted()
         raise typer.Exit(130) from None

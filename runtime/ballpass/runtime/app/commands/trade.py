@@ -38,7 +38,10 @@ Against = Annotated[
         shown="WHAT",
     ),
 ]
-Members = Annotated[int | None, Option(words="Parameter sets around the scene's; 40 if not given.", shown="N", least=2)]
+Members = Annotated[
+    int | None,
+    Option(words="Parameter sets around the scene's; 40 if not given.", shown="N", least=2, most=10_000),
+]
 
 
 def _report(found: Trade | Simplification) -> Report:
