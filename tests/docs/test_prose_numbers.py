@@ -164,7 +164,7 @@ NAMED: dict[str, dict[str, str]] = {
         "limited to between 0.1 and 0.9": "step_size.h",
         "within 0.01 % of": "a factor of 1.0001 in lane_control.h",
         "of order 7 with four": "a property of the method",
-        "at 1.00 without damping and at 2.68 for a damping ratio of 0.1": "control.h",
+        "at 1.00 without damping and at 2.68 for a damping ratio of 0.1": "methods/dp54.py",
         "below 1.7 times": "control.h",
         "below 1.25 times": "control.h",
         "below 0.35 the run changes": "control.h",
@@ -179,7 +179,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/theory/life.md": {
         "has 4200 MPa in": "a limit of the standard",
         "a peak pressure above 4200 MPa": "a limit of the standard",
-        "above 500 000 mm/min": "ask/life_limits.py",
+        "above 500 000 mm/min": "a limit of the catalogues, in other units in ask/life_limits.py",
         "207 GPa, 0.3)": "numbers of the standard",
         "SKF's C is 5 % higher for the same balls: 16 % of life": "a comparison of catalogues",
         "with 1.044 in": "a number of the standard",
