@@ -167,7 +167,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/theory/life.md": {
         "has 4200 MPa in": "a limit of the standard",
         "a peak pressure above 4200 MPa": "a limit of the standard",
-        "above 500 000 mm/min": "ask/life_limits.py",
+        "above 500 000 mm/min": "a limit of the catalogues, in other units in ask/life_limits.py",
         "207 GPa, 0.3)": "numbers of the standard",
         "SKF's C is 5 % higher for the same balls: 16 % of life": "a comparison of catalogues",
         "with 1.044 in": "a number of the standard",
