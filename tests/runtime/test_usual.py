@@ -97,7 +97,7 @@ def test_an_ensemble_warns_once_and_says_how_many(make_model: Callable[..., Mode
 
 
 def test_what_a_run_shows_is_said(make_model: Callable[..., Model]) -> None:
-    """A tenfold punch presses balls by Hertz's law beyond a hundredth of them; one downwards drives, as in an engine."""
+    """A tenfold punch presses balls by Hertz's law beyond a hundredth of them; one downwards drives, like an engine."""
     model = make_model("punching_press")
     run = model.simulate(cycles=3, parameters={"mechanism.forces.punch.force.y": 89648.0})
     with pytest.warns(UnusualWarning, match="a ball is deflected by"):

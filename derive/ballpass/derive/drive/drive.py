@@ -20,9 +20,11 @@ class OverAngle:
     """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
 
     `smoothness` is that of what is a function of the state, by name, and `switches` are where it jumps.
+    `constants` are derived ones in it.
     """
 
     value: sp.Expr
+    constants: tuple[Definition, ...] = ()
     inputs: tuple[Input, ...] = ()
     definitions: tuple[Definition, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()

@@ -33,7 +33,8 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float], scene: str 
                 f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "
                 f"so the faster it turns. `ballpass trade {scene} --against two-way` measures it."
             )
-    sudden = [name for name, _, _, item in mechanism.forces if item == f"gate.{name}"]
+    gates = {info.name for info in manifest.inputs if info.kind == "gate"}
+    sudden = [name for name, _, _, item in mechanism.forces if item in gates]
     # where the angle is a state no input holds the gate, but the border of its window
     borders = {info.name.split(".")[1] for info in manifest.inputs if info.kind == "border" and info.windows}
     sudden += [name for name, _, _, _ in mechanism.forces if name in borders]
