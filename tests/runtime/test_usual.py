@@ -13,7 +13,7 @@ import pytest
 from ballpass.derive import Scene
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Manifest, Model, UnusualWarning
+from ballpass.runtime import Manifest, Model, SimulationError, UnusualWarning
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.contract.plausible_ranges import unusual
 
@@ -97,10 +97,39 @@ def test_an_ensemble_warns_once_and_says_how_many(make_model: Callable[..., Mode
 
 
 def test_what_a_run_shows_is_said(make_model: Callable[..., Model]) -> None:
-    """A tenfold punch presses balls by Hertz's law beyond a hundredth of them; one downwards drives the drive."""
+    """A tenfold punch presses balls by Hertz's law beyond a hundredth of them; one downwards drives, like an engine."""
     model = make_model("punching_press")
-    for force, words in ((89648.0, "a ball is deflected by"), (-8964.8, "the drive takes 9.078 J a turn")):
-        run = model.simulate(cycles=3, parameters={"mechanism.forces.punch.force.y": force})
-        with pytest.warns(UnusualWarning, match=words):
-            summary = summarize(model, run)
-        assert any(words in text for text in summary["warnings"])
+    run = model.simulate(cycles=3, parameters={"mechanism.forces.punch.force.y": 89648.0})
+    with pytest.warns(UnusualWarning, match="a ball is deflected by"):
+        summary = summarize(model, run)
+    assert any("a ball is deflected by" in text for text in summary["warnings"])
+    engine = model.simulate(cycles=3, parameters={"mechanism.forces.punch.force.y": -8964.8})
+    summary = summarize(model, engine)
+    assert summary["drive_work"]["value"] < -9.0
+    assert summary["warnings"] == []
+
+
+def test_results_that_no_bearing_could_have_are_errors(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    for numbers, words in (
+        ({"mechanism.forces.punch.force.y": 4e6}, "a ball is flattened by .* of its diameter.*Reduce load"),
+        ({"bearing.clearance": 20e-3}, "the rings are displaced by .* more than a ball's diameter"),
+    ):
+        run = model.simulate(cycles=3, parameters=numbers)
+        with pytest.raises(SimulationError, match=words):
+            summarize(model, run)
+
+
+def test_a_linkage_that_outweighs_its_ring_and_a_sudden_load_are_said(make_model: Callable[..., Model]) -> None:
+    """The press: 19.7 kg on a ring of 0.414 kg."""
+    for name in ("punching_press", "punching_press_two_way", "four_bar", "varying_compliance"):
+        model = make_model(name)
+        said = " ".join(model.explain().limits)
+        one_way = name in ("punching_press", "four_bar")
+        assert ("is loaded one-way" in said) == one_way
+        assert ("--against two-way" in said) == one_way
+        assert ("begins and ends at once" in said) == name.startswith("punching_press")
+        if name == "punching_press":
+            assert "the linkage, 19.7 kg" in said
+            assert "ring, 0.414 kg" in said
+            assert summarize(model, model.simulate(cycles=3))["limits"] == list(model.explain().limits)

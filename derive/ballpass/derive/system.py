@@ -228,7 +228,7 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         definitions=(
             *(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions, *own.definitions),
         ),
-        constants=own.constants,
+        constants=(*forces.constants, *own.constants),
         quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
         requested=_requested(mechanism, linkage, reactions, forces, (*inertias, *work_of_drive(linkage)[1]), weights),
         linkage=linkage,
@@ -299,6 +299,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
+            *forces.constants,
             *(c for swing in swings.values() for c in swing.constants),
             *(c for model in models for c in model.constants),
         ),

@@ -20,9 +20,11 @@ class OverAngle:
     """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
 
     `smoothness` is by name, of functions of the state; `switches` are the places where they jump.
+    `constants` are derived constants of the value.
     """
 
     value: sp.Expr
+    constants: tuple[Definition, ...] = ()
     inputs: tuple[Input, ...] = ()
     definitions: tuple[Definition, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()

@@ -254,6 +254,8 @@ def run(
         )
         stages("write")
         summary = summarize(model, solution, growth)
+        for words in summary["limits"]:
+            note(words)
         if asked_for:
             summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
         turned = add_turns(summary, longer, instead=turns is not None) if longer is not None else ""

@@ -28,6 +28,7 @@ from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
+from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -48,9 +49,8 @@ _TOOLS = ("casadi", "numpy", "scipy")
 #: The ball forces of a bearing whose peaks are reported, by their key.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 
-#: Largest usual deflection of a ball over its diameter [1]; negative work of the drive that counts as zero, over the
-#: work of the torque's amount [1].
-MOST_DEFLECTION, LEAST_WORK = 0.01, 1e-3
+#: Largest usual deflection of a ball over its diameter, and the largest that is a deflection at all [1].
+MOST_DEFLECTION, FLATTENED = 0.01, 0.1
 
 #: Numbers that `add_turns` names; the file has all.
 SHOWN = 5
@@ -112,34 +112,45 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
         for name in growth.uncertain:
             _add_spread(summary, growth, name)
     summary["versions"] = _versions(steady)
-    found = _unusual(model, steady)
+    found = _unusual(steady)
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
     grown = [growth.words] if growth is not None and growth.words else []
+    summary["limits"] = list(limits_of_model(manifest, model.numbers(sol.parameters).values))
     summary["warnings"] = [*unusual(manifest, sol.parameters), *found, *grown]
     return summary
 
 
-def _unusual(model: Model, sol: Solution) -> list[str]:
-    """Results outside what real bearings and machines show."""
+def _unusual(sol: Solution) -> list[str]:
+    """Results outside what real bearings show.
+
+    Raises
+    ------
+    SimulationError
+        No bearing could be so: a ball is flattened by more than a tenth, or a ring displaced by more than a ball.
+    """
     said = []
     for bearing in sol.manifest.bearings:
         ball, clearance = (sol.parameters[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
         apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
-        deflection = float(np.max(apart)) - clearance / 2.0
+        displacement = float(np.max(apart))
+        deflection = displacement - clearance / 2.0
+        if deflection > FLATTENED * ball or displacement > ball:
+            what = (
+                f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
+                if deflection > FLATTENED * ball
+                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a ball's diameter"
+            )
+            raise SimulationError(
+                f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
+                "clearance, give more damping, or check stiffness, masses and their units."
+            )
         if deflection > MOST_DEFLECTION * ball:
             said.append(
                 f"{bearing.path}: a ball is deflected by {1e6 * deflection:.4g} um, {100.0 * deflection / ball:.3g} % "
                 f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
                 "beyond. Check loads, stiffness and their units."
-            )
-    if "drive_torque" in sol.outputs and _has_turn(sol):
-        work, gross = _drive_work(model, sol), TURN * statistics(sol.t, np.abs(sol["drive_torque"])).mean
-        if work < -LEAST_WORK * gross:
-            said.append(
-                f"the drive takes {-work:.4g} J a turn out of the mechanism: unusual. Usual is a drive that "
-                "gives work. Check the directions of forces and speed, and the windows."
             )
     return said
 

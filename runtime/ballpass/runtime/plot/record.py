@@ -202,9 +202,9 @@ class Record:
                 continue
             cartesian, (magnitude, direction) = force_components(name)
             if cartesian[0] in parameters:
-                force = np.array([parameters[component] for component in cartesian])
+                force = amount * np.array([parameters[component] for component in cartesian])
             elif magnitude in parameters:
-                force = parameters[magnitude] * _unit(parameters[direction])
+                force = amount * parameters[magnitude] * _unit(parameters[direction])
             else:
                 force = amount * _unit(parameters[table_direction(name)])
             acting.append((name, (body, point), force))
@@ -217,6 +217,11 @@ class Record:
         if windows:
             edges = [(self.parameter(start), self.parameter(end)) for start, end in windows]
             return float(any((angle - start) % full < (end - start) % full for start, end in edges))
+        window = f"mechanism.forces.{name}.window"
+        if f"{window}.rise" in self.solution.parameters:
+            start, end, rise = (self.parameter(f"{window}.{key}") for key in ("start", "end", "rise"))
+            past, width = (angle - start) % full, (end - start) % full
+            return float(np.interp(past, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
         columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
         knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
         return float(np.interp(angle, knots, values, period=full))

@@ -23,6 +23,7 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.equilibrium import held_coordinates, static_equilibrium
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
@@ -112,6 +113,7 @@ class Explanation(ShortRepr, Reported):
     method: str
     reason: str
     unusual: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
 
     def _report(self) -> Report:
         where = "; ".join(f"{math.degrees(item.angle):.4g}° {item.cause}" for item in self.breakpoints) or "none"
@@ -143,6 +145,7 @@ class Explanation(ShortRepr, Reported):
         parts += [f"no equilibrium at {place}" for place in self.unsupported]
         parts += ["", Marked("Method", "head", f" auto takes {self.method}: {self.reason}")]
         parts += [Marked("unusual", "doubt", f" {words}") for words in self.unusual]
+        parts += [Marked("Limits", "doubt", f" {words}") for words in self.limits]
         scales = [
             asdict(item) | {"angle_deg": math.degrees(item.angle), "stiffness": item.stiffness} for item in self.scales
         ]
@@ -159,6 +162,7 @@ class Explanation(ShortRepr, Reported):
             "without_equilibrium": self.unsupported,
             "method": {"auto": self.method, "reason": self.reason},
             "warnings": self.unusual,
+            "limits": self.limits,
         }
         return Report(parts=parts, facts=facts, records=scales, index=("name",))
 
@@ -190,6 +194,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         method=method,
         reason=reason,
         unusual=tuple(unusual(manifest, numbers.parameters)),
+        limits=tuple(limits_of_model(manifest, values)),
     )
 
 

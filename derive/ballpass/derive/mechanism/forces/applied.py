@@ -33,6 +33,7 @@ class Forces:
     requested: tuple[Output, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()
     switches: tuple[StateSwitch, ...] = ()
+    constants: tuple[Definition, ...] = ()
 
 
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
@@ -51,6 +52,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         requested=tuple(setting.requested),
         smoothness=tuple(setting.smoothness),
         switches=tuple(setting.switches),
+        constants=tuple(setting.constants),
     )
 
 

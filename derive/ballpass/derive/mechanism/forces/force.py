@@ -36,7 +36,7 @@ __all__ = ["Action", "ForceTable", "Law", "Measure", "Pathway", "Points", "Setti
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """The linkage that forces act in, and their definitions, inputs and outputs.
+    """The linkage that forces act in, and their derived constants, definitions, inputs and outputs.
 
     `requested` are outputs on request, `switched` are definitions that change with the driver's angle and that
     others use.
@@ -46,6 +46,7 @@ class Setting:
     linkage: Linkage
     drive: Drive
     ledger: Ledger = field(default_factory=Ledger)
+    constants: list[Definition] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
     requested: list[Output] = field(default_factory=list)
@@ -55,6 +56,7 @@ class Setting:
 
     def over_angle(self, found: OverAngle) -> sp.Expr:
         """Add a term that changes with the driver's angle; return its value."""
+        self.constants.extend(found.constants)
         self.inputs.extend(found.inputs)
         self.switched.extend(found.definitions)
         self.smoothness.extend(found.smoothness)

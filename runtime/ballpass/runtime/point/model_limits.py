@@ -1,0 +1,45 @@
+"""Where a model's simplifications decide about its forces: sentences for people, with the command that measures it.
+
+In: a manifest and values of its parameters and constants.  Out: sentences; none where nothing is to be said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from ballpass.runtime.contract import Manifest
+
+_BODY, _MASS = "mechanism.bodies.", ".mass"
+
+
+def limits_of_model(manifest: Manifest, values: Mapping[str, float], scene: str = "SCENE") -> Iterator[str]:
+    """Linkages that outweigh the ring of a bearing that is loaded one-way, and forces that begin at once.
+
+    Parameters
+    ----------
+    values : parameters and derived constants by name
+    scene : what the command line calls it
+    """
+    mechanism = manifest.mechanism
+    if mechanism is None or not manifest.bearings:
+        return
+    linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
+    for bearing in manifest.bearings:
+        ring = values.get(f"{bearing.path}.m_ei", values.get(f"{bearing.path}.inner_ring.mass", 0.0))
+        two_way = bearing.ring_speed.startswith(f"{bearing.path}.")
+        if bearing.joint and not two_way and linkage > ring:
+            yield (
+                f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
+                f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "
+                f"so the faster it turns. `ballpass trade {scene} --against two-way` measures it."
+            )
+    gates = {info.name for info in manifest.inputs if info.kind == "gate"}
+    sudden = [name for name, _, _, item in mechanism.forces if item in gates]
+    # where the angle is a state no input holds the gate, but the border of its window
+    borders = {info.name.split(".")[1] for info in manifest.inputs if info.kind == "border" and info.windows}
+    sudden += [name for name, _, _, _ in mechanism.forces if name in borders]
+    if sudden:
+        yield (
+            f"{', '.join(sudden)}: the load begins and ends at once. Peaks behind its edges are the overshoot of a "
+            'sudden load; a real one rises: give its window a rise, as rise = "5 deg".'
+        )
