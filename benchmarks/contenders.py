@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.native.stepper import METHODS, End
+from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run.locating import choose_kinks, stepper_for
 from benchmarks.problem import POINTS, Cycle, Member
 
@@ -59,7 +60,7 @@ def stepped(cycle: Cycle, name: str, tolerance: float) -> np.ndarray:
     stepper = stepper_for(cycle.model, choose_kinks(None, name, cycle.model.manifest, tolerance))
     states = np.empty((POINTS, len(cycle.start)))
     outcome = stepper.run(
-        family=METHODS[name],
+        method=STEPPERS[name],
         tolerance=tolerance * cycle.magnitude,
         p=cycle.numbers.p,
         c=cycle.numbers.c,
@@ -93,7 +94,7 @@ def _simulated(method: str, outputs: list[str] | None) -> Solve:
 def own_contenders() -> list[Contender]:
     """All of them, in the order of tables; plain `stepper`, to which ratios are, first."""
     return [
-        *(_stepper(name) for name in METHODS),
+        *(_stepper(name) for name in STEPPERS),
         Contender(label="model.simulate, outputs included", group="model.simulate", solve=_simulated("stepper", None),
                   tolerances=HALVES),
         Contender(label="CasADi cvodes, virtual machine", group="CasADi", solve=_simulated("cvodes", [])),

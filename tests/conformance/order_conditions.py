@@ -30,11 +30,8 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from stepper_methods import Tableau
 
-from ballpass.derive.methods.explicit import ExplicitTableau
-from ballpass.derive.methods.rosenbrock import RosenbrockTableau
-from ballpass.derive.methods.tableaus import Row, Rows
+from ballpass.runtime.contract.tableaus import ExplicitTableau, RosenbrockTableau, Row, Rows, Tableau
 
 #: Significant digits of the checks; the longest figures have 31, and cancellation takes a few.
 PRECISION = 50

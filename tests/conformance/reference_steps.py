@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from order_conditions import all_stages
 
-from ballpass.derive.methods.explicit import ExplicitTableau
-from ballpass.derive.methods.rosenbrock import RosenbrockTableau
-from ballpass.derive.methods.tableaus import Row, Rows
+from ballpass.runtime.contract.tableaus import ExplicitTableau, RosenbrockTableau, Row, Rows
 
 Vector = NDArray[np.inexact]
 Slope = Callable[[float, Vector], Vector]

@@ -15,7 +15,7 @@ from ballpass.derive.scene.records import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
-MODEL = ("model.c", "model.h", "kernels.h", "tangents.h", "ensemble_kernels.h", "methods.h", "model.casadi")
+MODEL = ("model.c", "model.h", "kernels.h", "tangents.h", "ensemble_kernels.h", "model.casadi")
 
 
 def press(scene_text: Callable[..., str], *changes: tuple[str, str]) -> Scene:
@@ -81,7 +81,7 @@ def test_unrequested_outputs_vanish(tmp_path: Path) -> None:
     bare = replace(scene, outputs=("inner.x",))
     assert count_operations(bare)["outputs"] == 0
     many, few = generate(scene, tmp_path / "many"), generate(bare, tmp_path / "few")
-    for name in ("kernels.h", "tangents.h", "methods.h"):
+    for name in ("kernels.h", "tangents.h"):
         assert (many / name).read_bytes() == (few / name).read_bytes(), name
     assert (few / "model.c").stat().st_size < (many / "model.c").stat().st_size
 

@@ -155,7 +155,7 @@ NAMED: dict[str, dict[str, str]] = {
         "limited to between 0.1 and 0.9": "step_size.h",
         "within 0.01 % of": "a factor of 1.0001 in lane_control.h",
         "of order 7 with four": "a property of the method",
-        "at 1.00 without damping and at 2.68 for a damping ratio of 0.1": "control.h",
+        "at 1.00 without damping and at 2.68 for a damping ratio of 0.1": "methods/dp54.py",
         "below 1.7 times": "control.h",
         "below 1.25 times": "control.h",
         "below 0.35 the run changes": "control.h",

@@ -1,26 +1,17 @@
-"""The methods of the stepper, from the tables that register them: what tests over all methods run on."""
+"""The methods of the stepper, from the registry: what tests over all methods run on."""
 
 from __future__ import annotations
 
-from ballpass.derive.emit.methods_header import _EXPLICIT, _ROSENBROCK
-from ballpass.derive.methods.explicit import ExplicitTableau
-from ballpass.derive.methods.rosenbrock import RosenbrockTableau
-from ballpass.runtime.native.stepper import METHODS, Family
+from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
+from ballpass.runtime.contract.tableaus import ExplicitTableau
 
-Tableau = ExplicitTableau | RosenbrockTableau
-
-#: Methods a user can name, by name; plain ``stepper`` chooses among them.
-FAMILIES: dict[str, Family] = {name: family for name, family in METHODS.items() if family is not Family.AUTO}
+#: Methods by the name that users give them; plain ``stepper`` chooses among them.
+FAMILIES: dict[str, str] = {asked: name for asked, name in STEPPERS.items() if name in METHODS}
 NAMES = tuple(FAMILIES)
-TABLEAUS: dict[str, Tableau] = {f"stepper-{name}": t for name, t in {**_EXPLICIT, **_ROSENBROCK}.items()}
+TABLEAUS = {asked: METHODS[name] for asked, name in FAMILIES.items()}
 EXPLICIT = tuple(name for name, tableau in TABLEAUS.items() if isinstance(tableau, ExplicitTableau))
-IMPLICIT = tuple(name for name, tableau in TABLEAUS.items() if isinstance(tableau, RosenbrockTableau))
+IMPLICIT = tuple(name for name in NAMES if name not in EXPLICIT)
 
 #: Order of convergence and order of the dense output, as printed.
-ORDERS: dict[str, tuple[int, int]] = {
-    "stepper-dp54": (5, 4),
-    "stepper-dop853": (8, 7),
-    "stepper-rodas4": (4, 3),
-    "stepper-rodas5p": (5, 4),
-}
+ORDERS = {name: (tableau.order, tableau.dense_order) for name, tableau in TABLEAUS.items()}
 FAMILY_ORDERS = {FAMILIES[name]: orders for name, orders in ORDERS.items()}

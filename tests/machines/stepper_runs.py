@@ -11,7 +11,7 @@ import numpy as np
 
 from ballpass.runtime import Model
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.native.stepper import Family, Outcome, Segments
+from ballpass.runtime.native.stepper import Outcome, Segments
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.segments import segment_edges
 
@@ -47,7 +47,7 @@ def run(
     numbers: Numbers,
     segments: Segments,
     *,
-    family: Family,
+    method: str,
     tolerance: np.ndarray | float,
     start: np.ndarray | None = None,
     output_times: np.ndarray | None = None,
@@ -59,7 +59,7 @@ def run(
     times = segments.times if output_times is None else np.array(output_times, dtype=float)
     states = np.full((len(times), len(x)), np.nan)
     outcome = model.stepper.run(
-        family=family,
+        method=method,
         tolerance=np.broadcast_to(tolerance, x.shape).astype(float),
         p=numbers.p,
         c=numbers.c,

@@ -52,7 +52,7 @@ def means_the_same(content: bytes, whole: bytes) -> bool:
         return False
 
 
-@pytest.mark.parametrize("name", ["model.c", "kernels.h", "model.casadi", "methods.h", "EQUATIONS.md", "manifest.json"])
+@pytest.mark.parametrize("name", ["model.c", "kernels.h", "model.casadi", "EQUATIONS.md", "manifest.json"])
 def test_an_edited_file_of_an_artefact_is_named_and_refused(rotor: Path, name: str) -> None:
     whole, draw, original = (rotor / name).read_bytes(), random.Random(name), load(rotor).manifest
     for _ in range(200 if LONG else 12):

@@ -14,12 +14,13 @@ import pytest
 from press_laws import press
 
 from ballpass.runtime import Model, RequestError, SimulationError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.member_schedule import MOMENTS
-from ballpass.runtime.native.stepper import METHODS, End
+from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.magnitudes import model_scales
@@ -66,7 +67,7 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 @pytest.mark.parametrize(
     "method",
     [
-        *("auto", "stepper-dp54"),
+        *("auto", "stepper-dp54", "stepper-dop853"),
         *(pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("rodas5p", "rodas4")),
     ],
 )
@@ -78,7 +79,7 @@ def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, 
         columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=rtol, method=method, kinks="stepped-over"
     )
     assert result.failures == ()
-    assert result.statistics.lanes == (1 if method == "stepper-rodas4" else model.ensemble_driver.lanes)
+    assert result.statistics.lanes == model.ensemble_driver.lanes
     for k in range(11):
         single = model.reduce(1.5, transient=0.75, rtol=rtol, method=method, parameters=member(columns, k))
         force, y = single["ball.force"], single["inner.y"]
@@ -532,7 +533,7 @@ def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouch
 ) -> None:
     """The driver looks at tolerances and segments as that of single runs does: no member begins that could not end."""
     model = make_model("varying_compliance")
-    driver, family = model.ensemble_driver, METHODS[stepper_method(method)]
+    driver, family = model.ensemble_driver, STEPPERS[stepper_method(method)]
     faults = [0.0, -1e-9, np.nan, 1e-320, 1e-9, 1e-9, 1e-9]
     count = len(faults)
     members = make_members(model, {"bearing.clearance": np.linspace(0.0, 2e-5, count)})

@@ -16,12 +16,12 @@ import pytest
 from press_laws import press
 
 from ballpass.runtime import Model
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many import chunks, member_segments
 from ballpass.runtime.many.chunks import PATIENCE
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Span, make_members
 from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
-from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import Kinks
 
@@ -77,7 +77,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
         reached = np.zeros(count)
         for part in parts:
             results = driver.run(
-                *(METHODS[stepper_method(method)], part, x, tolerance, rows, ctypes.c_int(0)),
+                *(STEPPERS[stepper_method(method)], part, x, tolerance, rows, ctypes.c_int(0)),
                 carried=carried,
                 reached=reached,
             )

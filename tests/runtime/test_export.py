@@ -565,7 +565,7 @@ def test_exported_folder_knows_no_machine_and_repeats_byte_for_byte(
         assert str(Path.home()).encode() not in content
     written = {path.name for path in again.iterdir()}
     assert {"Makefile", "README.md", "main.c", "ballpass.c", "ballpass.h", "scene.c", "constants.c"} <= written
-    assert {"kernels.h", "methods.h", "stepper.c"} <= written
+    assert {"kernels.h", "method_tables.h", "stepper.c"} <= written
 
 
 # command line
@@ -753,6 +753,6 @@ def test_model_without_states_and_edited_folders_are_refused(tmp_path: Path, exp
         export_c(edited, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     without = write_folder(tmp_path / "without")
-    with pytest.raises(ArtefactError, match=r"methods\.h"):
+    with pytest.raises(ArtefactError, match=r"kernels\.h"):
         export_c(without, tmp_path / "out")
     assert not (tmp_path / "out").exists()

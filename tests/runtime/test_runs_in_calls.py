@@ -16,9 +16,10 @@ import pytest
 from press_laws import press
 
 from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
-from ballpass.runtime.native.stepper import METHODS, End, Outcome, Stepper
+from ballpass.runtime.native.stepper import End, Outcome, Stepper
 from ballpass.runtime.run import driver_angle, limits, loop
 from ballpass.runtime.run.loop import RunFailed, RunUnderWay
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
@@ -44,7 +45,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
 
     def call(most: int) -> Outcome:
         return stepper.run(
-            family=METHODS[method],
+            method=STEPPERS[method],
             tolerance=tolerance,
             p=numbers.p,
             c=numbers.c,
@@ -67,7 +68,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
 
 @pytest.mark.parametrize("kinks", ["stepped-over", "located"])
 @pytest.mark.parametrize("law", ["tangent", "two-sided-gated"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", STEPPERS)
 def test_a_run_has_the_same_bits_however_it_is_cut_into_calls(
     make_model: ModelMaker, law: str, method: str, kinks: str
 ) -> None:
@@ -102,7 +103,7 @@ def test_reduced_runs_tell_progress_within_a_turn_and_keep_their_bits(
     assert (told[0] < 0.1, told[-1]) == (True, 1.0)
 
 
-@pytest.mark.parametrize("more", [{"lanes": False}, {"method": "stepper-rodas4"}, {"kinks": "located"}])
+@pytest.mark.parametrize("more", [{"lanes": False}, {"kinks": "located"}])
 def test_members_one_by_one_tell_progress_within_a_turn(
     make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, more: dict[str, Any]
 ) -> None:

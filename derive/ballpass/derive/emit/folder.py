@@ -7,7 +7,6 @@ equations.c, .h    right-hand side, its derivatives, mass matrix: compiled when 
 kernels.h          the model cut into inline functions for the project's own stepper
 tangents.h         derivatives of these along several directions at once, for sensitivities
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
-methods.h          the stepper's methods
 switches.h         where the laws have kinks, for runs whose steps end there; no such file where they have none
 model.casadi, equations.casadi    the same functions serialised, for machines without a compiler
 jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
@@ -31,7 +30,6 @@ import casadi as ca
 from ballpass.derive.emit.describe import describe
 from ballpass.derive.emit.equations import equations
 from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header, switches_header, tangents_header
-from ballpass.derive.emit.methods_header import methods_header
 from ballpass.derive.lowering.functions import LoweredFunctions
 from ballpass.derive.lowering.jacobians import DERIVATIVES, Described
 from ballpass.derive.system import System
@@ -62,7 +60,6 @@ def _headers(system: System, functions: LoweredFunctions) -> dict[str, str]:
         return {}
     headers = {
         "kernels.h": kernels_header(system, functions, kernels),
-        "methods.h": methods_header(),
         "ensemble_kernels.h": ensemble_header(kernels),
         "tangents.h": tangents_header(kernels),
     }

@@ -46,7 +46,6 @@ GENERATED = (
     "jacobians.h",
     "kernels.h",
     mf.FILE_NAME,
-    "methods.h",
     "model.c",
     "model.casadi",
     "model.h",

@@ -22,19 +22,11 @@ from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limit
 from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.show import html
 
 #: Of a length in polar form.
 AMOUNT = Limits(bounds=NOT_NEGATIVE, remedy="give the amount, and turn the angle by 180 deg")
-METHODS = (
-    "auto",
-    "stepper",
-    "stepper-rodas4",
-    "stepper-rodas5p",
-    "stepper-dp54",
-    "stepper-dop853",
-    "cvodes",
-)
 
 
 def force_key(words: str, symbol: str, index: str = "", **more: Any) -> VectorKey:
@@ -404,7 +396,12 @@ class RunSettings:
         )
     )
     method: str = declared(
-        ChoiceKey(words="Integrator", choices=METHODS, default="auto", note="see {doc}`../theory/integration`")
+        ChoiceKey(
+            words="Integrator",
+            choices=("auto", *STEPPERS, "cvodes"),
+            default="auto",
+            note="see {doc}`../theory/integration`",
+        )
     )
     rtol: float = quantity(
         "1",

@@ -51,6 +51,7 @@ from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions import QUESTIONS
@@ -128,7 +129,7 @@ def run(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), cvodes.",
+            help=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.",
         ),
     ] = None,
     kinks: Annotated[
@@ -394,7 +395,6 @@ def _check_request(
     """Refuse options that no model can follow, before anything is derived or written; `goes_on` from another run."""
     from ballpass.runtime.contract.parameters import unknown_name
     from ballpass.runtime.native.casadi_integrators import METHODS
-    from ballpass.runtime.native.stepper import METHODS as STEPPERS
 
     known = ("auto", *STEPPERS, *METHODS)
     if method is not None and method not in known:

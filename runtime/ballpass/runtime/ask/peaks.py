@@ -18,10 +18,10 @@ from typing import Literal
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 from ballpass.runtime.certify.growth import refuse_growth
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run import driver_angle
@@ -39,9 +39,9 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         A wrong request, or a method that does not differentiate its own steps.
     """
     asked = request.method or "auto"
-    if asked not in ("auto", *METHODS):
+    if asked not in ("auto", *STEPPERS):
         raise RequestError(
-            f"sensitivity: the method {asked!r} was given; allowed are auto, {', '.join(METHODS)}, which "
+            f"sensitivity: the method {asked!r} was given; allowed are auto, {', '.join(STEPPERS)}, which "
             "differentiate their own steps."
         )
     fine = "stepper-dop853"

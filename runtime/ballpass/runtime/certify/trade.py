@@ -20,6 +20,8 @@ from ballpass.runtime.certify.method_choice import MethodChoice, compared_quanti
 from ballpass.runtime.certify.trade_report import PROMISED, Measured, Trade
 from ballpass.runtime.contract.bounds import outside, violations
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.method_registry import AUTO, CHOICE, METHODS, STEPPERS
+from ballpass.runtime.contract.tableaus import RosenbrockTableau
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -42,12 +44,11 @@ MEMBERS = 40
 def ways_of(model: LoadedModel) -> tuple[MethodChoice, ...]:
     """Methods and tolerances that are measured; those that locate kinks where the motion has some."""
     stepped = {
-        "stepper": range(-8, -1),
-        "stepper-rodas4": range(-7, 0),
-        "stepper-rodas5p": range(-8, 0),
-        "stepper-dop853": range(-8, -1),
+        name: range(-8, 0 if isinstance(METHODS.get(method), RosenbrockTableau) else -1)
+        for name, method in STEPPERS.items()
+        if method != AUTO[0]  # which the choice takes where it fits
     }
-    located = {"stepper": range(-10, -2), "stepper-rodas5p": range(-8, -2)} if has_kinks(model.manifest) else {}
+    located = {CHOICE: range(-10, -2), REFERENCE.method: range(-8, -2)} if has_kinks(model.manifest) else {}
     return (
         *(MethodChoice(method=method, rtol=10.0**decade) for method, decades in stepped.items() for decade in decades),
         *(

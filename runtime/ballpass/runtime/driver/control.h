@@ -24,9 +24,6 @@ static const double BP_LIMITED = 0.9, BP_FAR_FROM_LIMIT = 0.3, BP_WORTH_SOLVING 
    the family is kept at a breakpoint. */
 static const double BP_WORTH_TRYING = 1.7, BP_WORTH_KEEPING = 3.0;
 
-/* Limits of stability of the explicit methods, step size times rate: for decay, and for DOP853 as well for oscillation without damping. */
-static const double BP_DP54_DECAY = 3.3, BP_DOP853_DECAY = 6.3, BP_DOP853_OSCILLATION = 5.9;
-
 /* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
    last the ring flies free. */
 static const double BP_HIGH_ORDER = 0.35, BP_LOW_ORDER = 1.2, BP_FREE = 1e-3;
@@ -70,12 +67,11 @@ static inline void bp_bounds(const double *restrict A, const double *restrict B,
     }
 }
 
-/* Limit of stability of Dormand-Prince 5(4) for an oscillation, step size times frequency, by its damping ratio: a fit within 6 %.  It is
-   1.00 without damping, 1.38 at a ratio of 0.001, 1.87 at 0.01, 2.68 at 0.1, 3.35 at 0.4. */
-static inline double bp_dp54_oscillation(double ratio)
+/* Limit of stability for an oscillation, step size times frequency, by its damping ratio. */
+static inline double bp_oscillation_limit(const bp_stability *limit, double ratio)
 {
-    const double fit = 3.84 * pow(ratio, 0.156);
-    return fit < 1.0 ? 1.0 : fit < BP_DP54_DECAY ? fit : BP_DP54_DECAY;
+    const double fit = limit->damped * pow(ratio, limit->exponent);
+    return fit < limit->undamped ? limit->undamped : fit < limit->decay ? fit : limit->decay;
 }
 
 /* Frequency [1/s] and damping ratio [1] of the fastest oscillation of q'' = A q + B q', from A^4: its size is nearly that of the largest
@@ -115,16 +111,16 @@ static inline double bp_fastest_mode(const double *restrict A, const double *res
     return frequency;
 }
 
-/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite where nothing touches. */
-static inline double bp_stable_step(const double *restrict A, const double *restrict B, int dp54)
+/* Largest step of an explicit method that is stable for q'' = A q + B q' [s]; infinite where nothing touches. */
+static inline double bp_stable_step(const double *restrict A, const double *restrict B, const bp_stability *limit)
 {
     double decay, squared, ratio;
     bp_bounds(A, B, &decay, &squared);
     const double half = 0.5 * decay;
-    double rate = half * half > squared ? (half + sqrt(half * half - squared)) / (dp54 ? BP_DP54_DECAY : BP_DOP853_DECAY) : 0.0;
+    double rate = half * half > squared ? (half + sqrt(half * half - squared)) / limit->decay : 0.0;
     if (squared > 0.0) {
         const double frequency = bp_fastest_mode(A, B, squared, &ratio);
-        const double oscillating = frequency / (dp54 ? bp_dp54_oscillation(ratio) : BP_DOP853_OSCILLATION);
+        const double oscillating = frequency / bp_oscillation_limit(limit, ratio);
         rate = oscillating > rate ? oscillating : rate;
     }
     return rate > 0.0 ? 1.0 / rate : INFINITY;

@@ -80,7 +80,7 @@ static int stretch_to_release(bp_run *run, double t, double h)
 
 static void explicit_tangents(bp_run *run, const bp_explicit_method *plain, double t, double h)
 {
-    bp_explicit_tangent_step(plain, plain->stages, run->tangents, run->blocks, &run->plain, &run->numbers, run->result->segment, t, run->x, h,
+    bp_explicit_tangent_step(plain, run->tangents, run->blocks, &run->plain, &run->numbers, run->result->segment, t, run->x, h,
                              step_lead(run), run->next);
 }
 
@@ -97,7 +97,7 @@ static double tangent_step(bp_run *run, double t, double h, double error, int me
         explicit_tangents(run, plain, t, h);
         if (met == CUT && stretch_to_release(run, t, h)) explicit_tangents(run, plain, t, h);
     } else {
-        bp_rosenbrock_tangent_step(linear, linear->stages, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers,
+        bp_rosenbrock_tangent_step(linear, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers,
                                    run->result->segment, t, run->x, h);
     }
     if (!tangents->weight) return error;

@@ -1,7 +1,7 @@
 /* Members in and out of lanes, step sizes, segments, reductions.  See ensemble.h; the steps themselves are in lanes.h.
 
-   Two passes take turns until every member is done: one advances members by Dormand and Prince, the other those by Rodas5P.  A member that
-   changes its family leaves its lane and waits for the other pass. */
+   Passes take turns until every member is done: each advances the members of one method.  A member that changes its method leaves its lane
+   and waits for the pass of that. */
 #include "ensemble.h"
 
 #include <float.h>
@@ -27,13 +27,12 @@ static void choose_start(const bp_job *job, long m)
         bp_linear work;
         bp_linear_start(&work, &n, 0.0, x, 1);
         result->evaluations++;
-        method = bp_starts_linear(&at->seen, work.A, work.B) ? BALLPASS_RODAS5P : BALLPASS_DP54;
+        method = bp_starts_linear(&at->seen, work.A, work.B) ? BP_AUTO_LINEAR : BP_AUTO_LOW;
         result->switches += at->method != method && at->method != BALLPASS_AUTO;
     }
     at->method = method;
     for (int k = 0; k < BP_NX; k++) weight[k] = 1.0 / job->tolerance[m * BP_NX + k];
-    at->step = bp_first_step(&n, 0.0, x, member_end(job, m) - member_start(job, m), weight,
-                             method == BALLPASS_DP54 ? bp_dp54.error_exponent : bp_rodas5p.error_exponent);
+    at->step = bp_first_step(&n, 0.0, x, member_end(job, m) - member_start(job, m), weight, bp_methods[method].error_exponent);
     at->log_error = BP_LOG_SMALL_ERROR;
     result->evaluations += 2;
 }
@@ -76,7 +75,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     b->log_error[lane] = at->log_error;
     b->rejected_last[lane] = 0.0;
     tell_looks(at, b, lane);
-    if (b->linearly) {
+    if (bp_methods[b->method].linear) {
         bp_stage_rate(at->t, n.u, n.p, n.c, w, wt);
         put(b->linear.w, lane, w, BP_NW);
         put(b->linear.wt, lane, wt, BP_NW);
@@ -127,14 +126,15 @@ static void leave_lane(const bp_job *job, bp_lane_block *b, int lane, int status
     ballpass_result *result = job->results + m;
     bp_member *at = job->member + m;
     get(b->x, lane, job->x + m * BP_NX, BP_NX);
+    const bp_method *method = &bp_methods[b->method];
     const long steps = (long)b->steps[lane], rejected = (long)b->rejected[lane];
     result->steps += steps;
     result->rejected += rejected;
-    result->evaluations += (steps + rejected) * (b->linearly ? BP_RODAS5P_STAGES : BP_DP54_STAGES);
-    result->factorizations += b->linearly ? steps + rejected : 0;
+    result->evaluations += (steps + rejected) * (method->plain ? method->plain->stages : method->linear->stages);
+    result->factorizations += method->linear ? steps + rejected : 0;
     result->pivoted += (long)b->pivoted[lane];
     result->status = status;
-    result->method = b->linearly ? BALLPASS_RODAS5P : BALLPASS_DP54;
+    result->method = b->method;
     result->step = b->step[lane];
     if (job->reductions != NULL) {
         double *row = job->reductions + m * BP_REDUCTION;
@@ -160,7 +160,8 @@ static void advance(bp_lane_block *b)
             const int i = k * BP_L + lane;
             b->x[i] = b->accepted[lane] != 0.0 ? b->next[i] : b->x[i];
         }
-    if (b->linearly) {
+    const bp_explicit_method *plain = bp_methods[b->method].plain;
+    if (!plain) {
         for (int k = 0; k < BP_NW; k++)
             BP_EACH_LANE {
                 const int i = k * BP_L + lane;
@@ -171,7 +172,7 @@ static void advance(bp_lane_block *b)
         for (int k = 0; k < BP_NX; k++)
             BP_EACH_LANE {
                 const int i = k * BP_L + lane;
-                b->plain.k[0][i] = b->accepted[lane] != 0.0 ? b->plain.k[BP_DP54_STAGES][i] : b->plain.k[0][i];
+                b->plain.k[0][i] = b->accepted[lane] != 0.0 ? b->plain.k[plain->stages][i] : b->plain.k[0][i];
             }
     }
     BP_EACH_LANE {
@@ -219,9 +220,9 @@ static int settle(const bp_job *job, bp_lane_block *b, int lane)
     int status = BALLPASS_DONE;
     const int changing = b->changing[lane] != 0.0;
     if (changing) {
-        at->method = b->linearly ? BALLPASS_DP54 : BALLPASS_RODAS5P;
+        at->method = (int)b->changing[lane];
         result->switches++;
-        if (b->linearly && b->step[lane] > at->family.stable) b->step[lane] = at->family.stable;
+        if (bp_methods[at->method].plain && b->step[lane] > at->family.stable) b->step[lane] = at->family.stable;
         b->changing[lane] = 0.0;
     }
     if (b->accepted[lane] != 0.0 && b->last[lane] != 0.0) {
@@ -234,7 +235,7 @@ static int settle(const bp_job *job, bp_lane_block *b, int lane)
             if (!(member_end(job, m) > member_start(job, m))) continue;
             get(b->x, lane, job->x + m * BP_NX, BP_NX);
             begin_segment(job, m);
-            if ((at->method == BALLPASS_RODAS5P) == b->linearly) {
+            if (at->method == b->method) {
                 enter_segment(job, b, lane);
                 return 0;
             }
@@ -265,10 +266,10 @@ static int settle(const bp_job *job, bp_lane_block *b, int lane)
 }
 
 /* The next member that waits for this pass, from `from` on; -1 if none. */
-static long next_member(const bp_job *job, int linearly, long from)
+static long next_member(const bp_job *job, int method, long from)
 {
     for (long m = from; m < job->members; m++)
-        if (job->member[m].phase == BP_WAITING && (job->member[m].method == BALLPASS_RODAS5P) == linearly) return m;
+        if (job->member[m].phase == BP_WAITING && job->member[m].method == method) return m;
     return -1;
 }
 
@@ -280,15 +281,17 @@ static void tell_reached(const bp_job *job, const bp_lane_block *b)
         if (b->active[lane] != 0.0) job->options->reached[b->who[lane]] = b->start[lane] + b->t[lane];
 }
 
-/* Advance all members that wait for a family until they are done or leave it; returns 0 when asked to stop. */
-static int pass(const bp_job *job, bp_lane_block *b, int linearly)
+/* Advance all members that wait for a method until they are done or leave it; returns 0 when asked to stop. */
+static int pass(const bp_job *job, bp_lane_block *b, int method)
 {
     const int changeable = job->options->method == BALLPASS_AUTO;
-    long waiting = next_member(job, linearly, 0);
+    const bp_explicit_method *plain = bp_methods[method].plain;
+    const bp_rosenbrock_method *linear = bp_methods[method].linear;
+    long waiting = next_member(job, method, 0);
     int filled = 0, stopped = 0;
     if (waiting < 0) return 1;
     memset(b, 0, sizeof *b);
-    b->linearly = linearly;
+    b->method = method;
     b->wanted = job->reductions != NULL ? job->reductions + BP_WANTED : NULL;
     b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
     b->powers = job->reductions != NULL ? bp_powers_wanted(job->reductions) : 0;
@@ -300,7 +303,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
         enter_lane(job, b, lane, waiting >= 0 ? waiting : b->who[0]);
         if (waiting >= 0) {
             filled++;
-            waiting = next_member(job, linearly, waiting + 1);
+            waiting = next_member(job, method, waiting + 1);
         } else {
             job->results[b->who[lane]].evaluations--;
             b->active[lane] = b->reducing[lane] = b->t[lane] = 0.0;
@@ -311,8 +314,12 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
     }
     for (long round = 0; filled > 0 && !stopped; round++) {
         choose_steps(b);
-        if (linearly) bp_lane_linear_step(&b->linear, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
-        else bp_lane_explicit_step(&b->plain, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
+        if (linear) bp_lane_linear_step(linear, &b->linear, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
+        /* the method of most runs once more, so that its coefficients are constants */
+        else if (method == BP_AUTO_LOW)
+            bp_lane_explicit_step(bp_methods[BP_AUTO_LOW].plain, &b->plain, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next,
+                                  b->error);
+        else bp_lane_explicit_step(plain, &b->plain, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
         judge(job, b, changeable);
         double reducing = 0.0;
         for (int lane = 0; lane < BP_L; lane++) reducing += b->reducing[lane];
@@ -323,7 +330,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
             if (b->active[lane] == 0.0 || !settle(job, b, lane)) continue;
             if (waiting >= 0) {
                 enter_lane(job, b, lane, waiting);
-                waiting = next_member(job, linearly, waiting + 1);
+                waiting = next_member(job, method, waiting + 1);
             } else {
                 filled--;
             }
@@ -343,7 +350,7 @@ int ballpass_ensemble(const ballpass_ensemble_options *options, long members, co
 {
     const bp_job job = {options, members, p, c, tolerance, x, first, times, inputs, restarts, reductions, work, results};
     bp_lane_block block;
-    if (options->method != BALLPASS_AUTO && options->method != BALLPASS_DP54 && options->method != BALLPASS_RODAS5P) return BALLPASS_BAD_ARGUMENT;
+    if (options->method < BALLPASS_AUTO || options->method >= BP_METHODS) return BALLPASS_BAD_ARGUMENT;
     for (long m = 0; m < members; m++) {
         ballpass_result *result = results + m;
         bp_member *at = job.member + m;
@@ -377,10 +384,15 @@ int ballpass_ensemble(const ballpass_ensemble_options *options, long members, co
         at->phase = BP_WAITING;
         result->status = BALLPASS_STOPPED; /* unless it comes to another end */
     }
-    for (int linearly = 0;; linearly = !linearly) {
-        if (next_member(&job, linearly, 0) < 0 && next_member(&job, !linearly, 0) < 0) return BALLPASS_DONE;
-        if (!pass(&job, &block, linearly)) break;
+    int under_way = 1, stopped = 0;
+    while (under_way && !stopped) {
+        under_way = 0;
+        for (int method = 1; method < BP_METHODS && !stopped; method++) {
+            under_way |= next_member(&job, method, 0) >= 0;
+            stopped = !pass(&job, &block, method);
+        }
     }
+    if (!stopped) return BALLPASS_DONE;
     for (long m = 0; m < members; m++)
         if (job.member[m].phase == BP_WAITING) results[m].status = BALLPASS_STOPPED;
     return BALLPASS_STOPPED;

@@ -16,7 +16,7 @@
 enum { BALLPASS_STOPPED = 5 }; /* status of members that were under way when the caller asked to stop */
 
 typedef struct {
-    int method;               /* BALLPASS_AUTO, BALLPASS_DP54 or BALLPASS_RODAS5P */
+    int method;               /* its number */
     int resume;               /* nonzero: go on behind an earlier call with the same x, reductions, work and results */
     const long *max_steps;    /* of each member, accepted and rejected, in all its calls */
     const volatile int *stop; /* the call ends soon after this becomes nonzero; or NULL */

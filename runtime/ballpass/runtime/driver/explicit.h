@@ -68,10 +68,11 @@ BP_INLINE void BP_NAME(norm)(const double *restrict error, const double *restric
 }
 
 /* Slopes k of a step of size h from x to `next`, that at its end included; the first is known.  `argument`: of the last stage. */
-BP_INLINE void BP_NAME(explicit_stages)(const bp_explicit_method *restrict method, const int stages, const BP_NAME(times) *at,
-                                        double k[][BP_NX * BP_W], double *restrict argument, const double *restrict x,
-                                        const double *restrict h, double *restrict next)
+BP_INLINE void BP_NAME(explicit_stages)(const bp_explicit_method *restrict method, const BP_NAME(times) *at, double k[][BP_NX * BP_W],
+                                        double *restrict argument, const double *restrict x, const double *restrict h,
+                                        double *restrict next)
 {
+    const int stages = method->stages;
     /* the latest slope stays in registers and is added last: all else is ready before it is */
     double last[BP_NX * BP_W] BP_ALIGNED, y[BP_NX * BP_W] BP_ALIGNED;
     for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, last, c) = BP_AT(BP_N, k[0], c);
@@ -82,8 +83,7 @@ BP_INLINE void BP_NAME(explicit_stages)(const bp_explicit_method *restrict metho
         BP_NAME(combine)(row, i - 1, (const double(*)[BP_NX * BP_W])k, h, x, base);
 #pragma GCC unroll 16
         for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, y, c) = BP_AT(BP_N, base, c) + latest * BP_AT(BP_N, last, c);
-        /* the last stage and the end slope are both at the step's end */
-        BP_NAME(slope)(at, i, i < stages ? i - 1 : stages - 2, y, last);
+        BP_NAME(slope)(at, i, i < stages ? i - 1 : method->times - 1, y, last);
 #pragma GCC unroll 16
         for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, k[i], c) = BP_AT(BP_N, last, c);
         if (i < stages - 1) continue;
@@ -93,13 +93,13 @@ BP_INLINE void BP_NAME(explicit_stages)(const bp_explicit_method *restrict metho
 }
 
 /* Scaled error of that step. */
-BP_INLINE void BP_NAME(explicit_error)(const bp_explicit_method *restrict method, const int stages, const double k[][BP_NX * BP_W],
+BP_INLINE void BP_NAME(explicit_error)(const bp_explicit_method *restrict method, const double k[][BP_NX * BP_W],
                                        const double *restrict h, const double *restrict weight, double *restrict error)
 {
     double first[BP_W] BP_ALIGNED = {0.0}, below[BP_W] BP_ALIGNED = {0.0};
     for (int m = 0; m < method->estimates; m++) {
         double estimate[BP_NX * BP_W] BP_ALIGNED, norm[BP_W] BP_ALIGNED;
-        BP_NAME(add)(method->error[m], stages + 1, k, (const BP_H *)h, NULL, estimate);
+        BP_NAME(add)(method->error[m], method->stages + 1, k, (const BP_H *)h, NULL, estimate);
         BP_NAME(norm)(estimate, weight, norm);
 #pragma omp simd
         for (int l = 0; l < BP_W; l++) {

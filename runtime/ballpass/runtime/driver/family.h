@@ -11,8 +11,8 @@
 #include "control.h"
 #include "stepper.h"
 
-/* Reach at which the explicit methods are at the limit of stability. */
-static const double BP_DP54_LIMIT = 3.25, BP_DOP853_LIMIT = 6.1;
+/* Limits of stability of an explicit method. */
+static inline const bp_stability *bp_stability_of(int method) { return &bp_methods[method].plain->stability; }
 
 /* What a segment has shown about the families so far. */
 typedef struct {
@@ -51,14 +51,14 @@ static inline void bp_family_anew(bp_family *family)
     family->looks = 0;
 }
 
-/* Leave an explicit method, whose steps cost as much as steps of Dormand-Prince 5(4) of this size. */
+/* Leave an explicit method, whose steps cost as much as steps of this size by the one of low order. */
 static inline int bp_try_linear(bp_family *family, bp_seen *seen, double size)
 {
     bp_family_anew(family);
     family->stiff = family->vain = 0;
     seen->left = size;
     seen->gain = 0.0;
-    return BALLPASS_RODAS5P;
+    return BP_AUTO_LINEAR;
 }
 
 /* What a look at a step of an explicit method asks for: nothing; the other family at once; a decision, or one for which the largest stable
@@ -68,7 +68,7 @@ enum { BP_GO_ON, BP_GIVE_UP, BP_DECIDE, BP_ASK };
 /* Look at a step of size h and this reach by an explicit method. */
 static inline int bp_look_at_explicit(bp_family *family, int method, double reach, double h)
 {
-    const double limit = method == BALLPASS_DP54 ? BP_DP54_LIMIT : BP_DOP853_LIMIT;
+    const double limit = bp_stability_of(method)->reach;
     family->stiff = reach > limit ? family->stiff + 1 : 0;
     if (family->stiff >= BP_STIFF_STEPS) return BP_GIVE_UP;
     /* nothing touches: no rate to be held down by */
@@ -82,25 +82,25 @@ static inline int bp_look_at_explicit(bp_family *family, int method, double reac
 }
 
 /* The method for the next step behind that; `stable`: the largest stable step of the method at hand, infinite where it was not asked for
-   [s]; `high_order`: whether DOP853 is to be had. */
+   [s]; `high_order`: whether that method is to be had. */
 static inline int bp_after_explicit(bp_family *family, bp_seen *seen, int method, double stable, int high_order)
 {
-    const int dp54 = method == BALLPASS_DP54;
+    const int low = method == BP_AUTO_LOW;
     const double size = family->mean_size, reach = family->mean_reach;
     if (family->wait > 0) family->wait--;
-    else if (size > BP_LIMITED * stable) return bp_try_linear(family, seen, (dp54 ? 1.0 : 0.5) * (size < stable ? size : stable));
+    else if (size > BP_LIMITED * stable) return bp_try_linear(family, seen, (low ? 1.0 : 0.5) * (size < stable ? size : stable));
     const int far = stable < INFINITY && size < BP_FAR_FROM_LIMIT * stable;
     if (far) family->rest = BP_FAMILY_REST;
-    if (!(high_order && (dp54 ? far && reach < BP_HIGH_ORDER : reach > BP_LOW_ORDER))) return method;
+    if (!(high_order && (low ? far && reach < BP_HIGH_ORDER : reach > BP_LOW_ORDER))) return method;
     family->stiff = 0;
     family->stable = INFINITY;
-    return dp54 ? BALLPASS_DOP853 : BALLPASS_DP54;
+    return low ? BP_AUTO_HIGH : BP_AUTO_LOW;
 }
 
 /* Look at a step of size h by a linearly implicit method; whether there is something to decide on. */
 static inline int bp_look_at_linear(bp_family *family, double h) { return bp_family_decides(family, 0.0, h); }
 
-/* The method for the next step behind that, at whose start this was the largest stable step of Dormand-Prince 5(4) [s]. */
+/* The method for the next step behind that, at whose start this was the largest stable step of the explicit one of low order [s]. */
 static inline int bp_after_linear(bp_family *family, bp_seen *seen, int method, double stable)
 {
     /* the least of the run: balls that are off now come back */
@@ -121,23 +121,23 @@ static inline int bp_after_linear(bp_family *family, bp_seen *seen, int method, 
     family->wait = family->pause;
     family->pause = family->pause > 0 ? 2 * family->pause : 1;
     seen->left = seen->gain = 0.0;
-    return BALLPASS_DP54;
+    return BP_AUTO_LOW;
 }
 
-/* The largest stable step of Dormand-Prince 5(4) or DOP853 where a run's step started [s]. */
-typedef double bp_stable(void *run, int dp54);
+/* The largest stable step within these limits where a run's step started [s]. */
+typedef double bp_stable(void *run, const bp_stability *limit);
 
 /* The method for the next step, from an accepted one of size h that is looked at; `reach`: of an explicit method. */
 static inline int bp_judge_family(bp_family *family, bp_seen *seen, int method, int high_order, double h, double reach, bp_stable *stable,
                                   void *run)
 {
-    const int dp54 = method == BALLPASS_DP54;
-    if (!dp54 && method != BALLPASS_DOP853)
-        return bp_look_at_linear(family, h) ? bp_after_linear(family, seen, method, stable(run, 1)) : method;
+    const int low = method == BP_AUTO_LOW;
+    if (bp_methods[method].linear)
+        return bp_look_at_linear(family, h) ? bp_after_linear(family, seen, method, stable(run, bp_stability_of(BP_AUTO_LOW))) : method;
     const int wanted = bp_look_at_explicit(family, method, reach, h);
     if (wanted == BP_GO_ON) return method;
-    if (wanted == BP_GIVE_UP) return bp_try_linear(family, seen, dp54 ? h : 0.5 * h);
-    return bp_after_explicit(family, seen, method, wanted == BP_ASK ? stable(run, dp54) : INFINITY, high_order);
+    if (wanted == BP_GIVE_UP) return bp_try_linear(family, seen, low ? h : 0.5 * h);
+    return bp_after_explicit(family, seen, method, wanted == BP_ASK ? stable(run, bp_stability_of(method)) : INFINITY, high_order);
 }
 
 /* Whether a segment behind a breakpoint starts with the linearly implicit family. */

@@ -42,7 +42,7 @@ typedef struct {
     double h[BP_L] BP_ALIGNED, error[BP_L] BP_ALIGNED;
     /* flags, as numbers so that they live in lanes as well */
     double active[BP_L] BP_ALIGNED, last[BP_L] BP_ALIGNED, accepted[BP_L] BP_ALIGNED, rejected_last[BP_L] BP_ALIGNED;
-    double small[BP_L] BP_ALIGNED, reducing[BP_L] BP_ALIGNED, changing[BP_L] BP_ALIGNED;
+    double small[BP_L] BP_ALIGNED, reducing[BP_L] BP_ALIGNED, changing[BP_L] BP_ALIGNED; /* changing: the method to change to */
     double steps[BP_L] BP_ALIGNED, rejected[BP_L] BP_ALIGNED, pivoted[BP_L] BP_ALIGNED; /* since the member entered its lane */
     double allowed[BP_L] BP_ALIGNED; /* steps, accepted and rejected */
     /* what bp_family_looks looks at: steps until the next look, and whether all are looked at */
@@ -57,7 +57,7 @@ typedef struct {
     double integral[BP_CHANNELS * BP_L] BP_ALIGNED, square[BP_CHANNELS * BP_L] BP_ALIGNED;
     long who[BP_L];
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
-    int linearly;       /* which family this pass advances */
+    int method;         /* which this pass advances */
     int balls, powers;  /* whether channels of the balls, and powers of their loads, are reduced */
     const double *wanted; /* not zero for channels that are reduced; all members have the same */
     bp_lane_numbers numbers;

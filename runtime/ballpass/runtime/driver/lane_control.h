@@ -28,12 +28,12 @@ typedef struct {
     int lane;
 } bp_lane_step;
 
-static double lane_stable_step(void *from, int dp54)
+static double lane_stable_step(void *from, const bp_stability *limit)
 {
     const bp_lane_step *step = from;
     const bp_lane_block *b = step->b;
     bp_linear work;
-    if (b->linearly) {
+    if (bp_methods[b->method].linear) {
         get(b->linear.A, step->lane, work.A, BP_NQ * BP_NQ);
         get(b->linear.B, step->lane, work.B, BP_NQ * BP_NQ);
     } else {
@@ -44,7 +44,7 @@ static double lane_stable_step(void *from, int dp54)
         bp_linear_start(&work, &n, b->t[step->lane], x, 1);
         step->job->results[m].evaluations++;
     }
-    return bp_stable_step(work.A, work.B, dp54);
+    return bp_stable_step(work.A, work.B, limit);
 }
 
 /* Ask the rule of families about the lanes in which a step is to be looked at. */
@@ -52,7 +52,8 @@ static void look(const bp_job *job, bp_lane_block *b, const double *looking)
 {
     double reach[BP_L] BP_ALIGNED = {0.0};
     const double(*k)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->plain.k;
-    if (!b->linearly) bp_lane_explicit_reach(BP_DP54_STAGES, k, b->plain.y, b->h, b->next, b->weight, reach);
+    const bp_explicit_method *plain = bp_methods[b->method].plain;
+    if (plain) bp_lane_explicit_reach(plain->stages, k, b->plain.y, b->h, b->next, b->weight, reach);
     for (int lane = 0; lane < BP_L; lane++) {
         if (looking[lane] == 0.0) continue;
         bp_member *at = job->member + b->who[lane];
@@ -60,7 +61,7 @@ static void look(const bp_job *job, bp_lane_block *b, const double *looking)
         /* the lane has counted to the next look; of the steps only the rest by BP_STIFF_LOOK matters */
         if (at->family.stiff == 0) at->family.steps = 1;
         const int method = bp_judge_family(&at->family, &at->seen, at->method, 0, b->h[lane], reach[lane], lane_stable_step, &step);
-        b->changing[lane] = method == at->method ? 0.0 : 1.0;
+        b->changing[lane] = method == at->method ? 0.0 : (double)method;
         tell_looks(at, b, lane);
     }
 }
@@ -75,7 +76,7 @@ static void judge(const bp_job *job, bp_lane_block *b, int changeable)
     for (int k = 0; k < BP_NX; k++)
         BP_EACH_LANE beyond[lane] += fabs(b->next[k * BP_L + lane]) * b->weight[k * BP_L + lane] <= 1.0 / DBL_EPSILON ? 0.0 : 1.0;
     BP_EACH_LANE b->accepted[lane] = b->error[lane] <= 1.0 && beyond[lane] == 0.0 ? b->active[lane] : 0.0;
-    bp_lane_step_factor(b->linearly ? bp_rodas5p.error_exponent : bp_dp54.error_exponent, b->error, b->accepted, b->rejected_last,
+    bp_lane_step_factor(bp_methods[b->method].error_exponent, b->error, b->accepted, b->rejected_last,
                         b->log_error, factor);
     BP_EACH_LANE {
         const double accepted = b->accepted[lane];
@@ -91,7 +92,7 @@ static void judge(const bp_job *job, bp_lane_block *b, int changeable)
         const double lasting = b->step[lane] * 1.0001 >= ahead ? b->active[lane] - accepted : b->active[lane];
         b->small[lane] = b->step[lane] <= b->resolution[lane] ? lasting : 0.0;
     }
-    if (b->linearly) BP_EACH_LANE b->pivoted[lane] += b->active[lane] * b->linear.pivoted[lane];
+    if (bp_methods[b->method].linear) BP_EACH_LANE b->pivoted[lane] += b->active[lane] * b->linear.pivoted[lane];
     if (!changeable) return;
     double looking[BP_L] BP_ALIGNED;
     int any = 0;

@@ -8,7 +8,8 @@
 typedef struct {
     bp_numbers n;
     double t, h, x[BP_NX], next[BP_NX], dense[BP_DENSE_ROWS][BP_NX];
-    int linearly;
+    const bp_method *method;
+    double part, span; /* of the step that is reduced: where it starts, and how much of it it is */
     double balls[BP_POINTS][BP_BALL_QUANTITIES]; /* at the quarters */
 } bp_lane_source;
 
@@ -16,22 +17,26 @@ static double lane_state(const void *from, double theta, double *x)
 {
     const bp_lane_source *source = from;
     const double(*dense)[BP_NX] = (const double(*)[BP_NX])source->dense;
-    if (theta >= 1.0) memcpy(x, source->next, sizeof source->next);
-    else if (source->linearly) bp_rosenbrock_at(&bp_rodas5p, dense, source->x, source->next, theta, x);
-    else bp_explicit_at(&bp_dp54, dense, source->x, source->next, theta, x);
-    return source->t + theta * source->h;
+    const bp_method *method = source->method;
+    const double place = source->part + source->span * theta;
+    if (place >= 1.0) memcpy(x, source->next, sizeof source->next);
+    else if (method->plain) bp_explicit_at(method->plain, dense, source->x, source->next, place, x);
+    else bp_rosenbrock_at(method->linear, dense, source->x, source->next, place, x);
+    return source->t + place * source->h;
 }
 
-static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, int balls, bp_lane_source *source)
+static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, double part, double span, int balls, bp_lane_source *source)
 {
     source->n = member_numbers(job, b->who[lane]);
     source->t = b->t[lane];
     source->h = b->h[lane];
-    source->linearly = b->linearly;
+    source->method = &bp_methods[b->method];
+    source->part = part;
+    source->span = span;
     get(b->x, lane, source->x, BP_NX);
     get(b->next, lane, source->next, BP_NX);
-    const int rows = b->linearly ? bp_rodas5p.dense_rows : 2 + bp_dp54.dense_rows;
-    for (int row = 0; row < rows; row++) get(b->dense[row], lane, source->dense[row], BP_NX);
+    const bp_explicit_method *plain = source->method->plain;
+    for (int row = 0; row < (plain ? 2 + plain->dense_rows : source->method->linear->dense_rows); row++) get(b->dense[row], lane, source->dense[row], BP_NX);
     for (int i = 0; i < BP_POINTS && balls; i++) {
         double x[BP_NX];
         const double t = lane_state(source, (double)i / (BP_POINTS - 1), x);
@@ -39,8 +44,8 @@ static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, int
     }
 }
 
-/* Add the steps of lanes to the places of the raceways; see bp_add_sectors. */
-static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
+/* Add a part of the steps of lanes to the places of the raceways; see bp_add_sectors. */
+static void add_sectors(const bp_job *job, bp_lane_block *b, double part, double span, const double *add)
 {
     double sum[BP_NB + 1][BP_L] BP_ALIGNED, moment[BP_NB + 1][BP_L] BP_ALIGNED;
     for (int j = 0; j < BP_NB; j++) {
@@ -59,15 +64,15 @@ static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
         const bp_numbers n = member_numbers(job, b->who[lane]);
         double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
         double *sectors = job->reductions + b->who[lane] * BP_REDUCTION + BP_RACEWAYS;
-        get(b->x, lane, x, BP_NX);
-        bp_passes(b->t[lane], x, n.u, n.p, n.c, from);
-        get(b->next, lane, x, BP_NX);
-        bp_passes(b->t[lane] + b->h[lane], x, n.u, n.p, n.c, to);
+        get(b->sampled[0], lane, x, BP_NX);
+        bp_passes(b->t[lane] + part * b->h[lane], x, n.u, n.p, n.c, from);
+        get(b->sampled[BP_POINTS - 1], lane, x, BP_NX);
+        bp_passes(b->t[lane] + (part + span) * b->h[lane], x, n.u, n.p, n.c, to);
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
             const double total = sum[BP_##b_##_FIRST_BALL + j][lane];                                                                   \
             if (total > 0.0)                                                                                                            \
-                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS, b->h[lane] * total,                         \
+                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS, span * b->h[lane] * total,                         \
                               moment[BP_##b_##_FIRST_BALL + j][lane] / total, from + 2 * (b_), to + 2 * (b_));                          \
         }
         BP_EACH_BEARING(BP_ADD)
@@ -75,20 +80,17 @@ static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
     }
 }
 
-/* Reductions of the lanes whose step was accepted; the same rules as bp_reduce. */
-static void reduce(const bp_job *job, bp_lane_block *b)
+/* Reductions of a part of the steps of the lanes to `add`, whose dense output is ready; the same rules as bp_reduce. */
+static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double span, const double *add)
 {
-    double add[BP_L] BP_ALIGNED;
-    BP_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
+    const bp_method *method = &bp_methods[b->method];
     const double(*dense)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->dense;
-    if (b->linearly) bp_lane_rosenbrock_dense(&bp_rodas5p, (const double(*)[BP_NX * BP_L])b->linear.u, b->dense);
-    else bp_lane_explicit_dense(&bp_dp54, NULL, b->plain.k, b->x, b->h, b->next, b->dense);
     for (int q = 1; q < BP_POINTS; q++) {
-        const double theta = (double)q / (BP_POINTS - 1);
+        const double theta = part + span * ((double)q / (BP_POINTS - 1));
         double *restrict y = b->sampled[q];
-        if (q == BP_POINTS - 1) memcpy(y, b->next, sizeof b->next);
-        else if (b->linearly) bp_lane_rosenbrock_at(&bp_rodas5p, dense, b->x, b->next, theta, y);
-        else bp_lane_explicit_at(&bp_dp54, dense, b->x, b->next, theta, y);
+        if (theta >= 1.0) memcpy(y, b->next, sizeof b->next);
+        else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
+        else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
         bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->cubes[q]);
     }
@@ -106,8 +108,8 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
             const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
             const double squares = k < BP_NX ? bp_mean_square(q) : boole;
-            b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
-            b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
+            b->integral[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * sum : 0.0;
+            b->square[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * squares : 0.0;
             if (k >= BP_LOOKED_AT) continue;
             const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
             of[lane] = add[lane] * (above + 2.0 * below);
@@ -119,9 +121,9 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         if (any[lane] == 0.0) continue;
         double *reduction = job->reductions + b->who[lane] * BP_REDUCTION;
         bp_lane_source source;
-        lane_source(job, b, lane, of_balls[lane] != 0.0, &source);
+        lane_source(job, b, lane, part, span, of_balls[lane] != 0.0, &source);
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
-        const bp_within step = {b->start[lane] + b->t[lane], b->h[lane], &source.n, lane_state, &source, balls};
+        const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], &source.n, lane_state, &source, balls};
         for (int k = 0; k < BP_CHANNELS; k++) {
             if (b->wanted[k] == 0.0) continue;
             const double *v = b->sampled[0] + k * BP_L + lane;
@@ -131,14 +133,31 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             b->minimum[k * BP_L + lane] = reduction[BP_MIN + k];
         }
     }
-    if (b->powers) add_sectors(job, b, add);
+    if (b->powers) add_sectors(job, b, part, span, add);
     for (int lane = 0; lane < BP_L; lane++)
-        if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += b->h[lane];
+        if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += span * b->h[lane];
     for (int k = 0; k < BP_CHANNELS; k++)
         BP_EACH_LANE {
             const int i = k * BP_L + lane;
             b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[BP_POINTS - 1][i] : b->sampled[0][i];
         }
+}
+
+/* Reductions of the lanes whose step was accepted. */
+static void reduce(const bp_job *job, bp_lane_block *b)
+{
+    const bp_method *method = &bp_methods[b->method];
+    const int parts = bp_parts(method->dense_degree);
+    double add[BP_L] BP_ALIGNED;
+    BP_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
+    if (method->plain) {
+        bp_lane_times at;
+        bp_lane_times_of(&at, &b->numbers, &b->angles, method->plain->dense_nodes, method->plain->dense_stages, b->t, b->h);
+        bp_lane_explicit_dense(method->plain, &at, b->plain.k, b->x, b->h, b->next, b->dense);
+    } else {
+        bp_lane_rosenbrock_dense(method->linear, (const double(*)[BP_NX * BP_L])b->linear.u, b->dense);
+    }
+    for (int part = 0; part < parts; part++) reduce_part(job, b, (double)part / parts, 1.0 / parts, add);
 }
 
 #endif

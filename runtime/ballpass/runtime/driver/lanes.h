@@ -55,21 +55,22 @@ static inline void bp_lane_exp(const double *restrict x, double *restrict y, con
 typedef double bp_lane __attribute__((vector_size(BP_L * sizeof(double)), aligned(8), may_alias));
 
 typedef struct {
-    double k[BP_DP54_STAGES + 1][BP_NX * BP_L] BP_ALIGNED; /* slopes; the first is known when a step starts */
+    double k[BP_METHOD_STAGES][BP_NX * BP_L] BP_ALIGNED; /* slopes; the first is known when a step starts */
     double y[BP_NX * BP_L] BP_ALIGNED;                     /* argument of the last stage: stiffness shows in it */
 } bp_lane_explicit;
 
 typedef struct {
     const bp_lane_numbers *n;
-    double w[BP_DP54_STAGES][BP_NW * BP_L] BP_ALIGNED;
+    double w[BP_METHOD_STAGES][BP_NW * BP_L] BP_ALIGNED;
 } bp_lane_times;
 
 typedef struct {
     const bp_lane_numbers *n;
+    const bp_rosenbrock_method *method;
     double w[BP_NW * BP_L] BP_ALIGNED, wt[BP_NW * BP_L] BP_ALIGNED;         /* stage variables at the start */
     double end_w[BP_NW * BP_L] BP_ALIGNED, end_wt[BP_NW * BP_L] BP_ALIGNED; /* and at the end of the step tried */
-    double inner_w[BP_RODAS5P_STAGES][BP_NW * BP_L] BP_ALIGNED;
-    double u[BP_RODAS5P_STAGES][BP_NX * BP_L] BP_ALIGNED;                   /* stages */
+    double inner_w[BP_METHOD_STAGES][BP_NW * BP_L] BP_ALIGNED;
+    double u[BP_METHOD_STAGES][BP_NX * BP_L] BP_ALIGNED;                    /* stages */
     double A[BP_NQ * BP_NQ * BP_L] BP_ALIGNED, B[BP_NQ * BP_NQ * BP_L] BP_ALIGNED; /* of the step tried */
     double dx[BP_NX * BP_L] BP_ALIGNED, at[BP_NQ * BP_L] BP_ALIGNED;
     double pivoted[BP_L] BP_ALIGNED; /* whether its system was solved with pivoting */
@@ -84,7 +85,7 @@ BP_INLINE void bp_lane_slope(const bp_lane_times *at, int i, int time, const dou
 BP_INLINE void bp_lane_linear_slope(const bp_lane_linear *at, int i, const double *restrict y, double *restrict dx)
 {
     if (i == 0) memcpy(dx, at->dx, sizeof at->dx);
-    else bp_lane_rate(at->n, i <= bp_rodas5p.inner ? at->inner_w[i - 1] : at->end_w, y, dx);
+    else bp_lane_rate(at->n, at->method->place[i] < at->method->inner ? at->inner_w[at->method->place[i]] : at->end_w, y, dx);
 }
 
 BP_INLINE bp_lane bp_lane_time_term(const bp_lane_linear *at, int i, int c, bp_lane d)
@@ -112,18 +113,25 @@ BP_INLINE bp_lane bp_lane_time_term(const bp_lane_linear *at, int i, int c, bp_l
 #undef BP_H
 #undef BP_S
 
-/* One step of Dormand and Prince from (t, x) to `next`, the end slope included. */
-static inline void bp_lane_explicit_step(bp_lane_explicit *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
+/* Stage variables at times of the step from t whose angles have been started. */
+BP_INLINE void bp_lane_times_of(bp_lane_times *restrict at, const bp_lane_numbers *n, const bp_lane_angles *restrict angles,
+                                const double *restrict nodes, int count, const double *restrict t, const double *restrict h)
+{
+    at->n = n;
+    for (int i = 0; i < count; i++) bp_lane_stage(n, angles, nodes[i], t, h, at->w[i]);
+}
+
+/* One explicit step from (t, x) to `next`, the end slope included. */
+BP_INLINE void bp_lane_explicit_step(const bp_explicit_method *restrict method, bp_lane_explicit *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
                                          const double *restrict t, const double *restrict x, const double *restrict h,
                                          const double *restrict weight, double *restrict next, double *restrict error)
 {
     bp_lane_times at;
-    at.n = n;
     bp_lane_angles_start(angles, n, t, h);
     /* all times of the step first: nothing in them waits for a slope */
-    for (int i = 1; i < BP_DP54_STAGES; i++) bp_lane_stage(n, angles, bp_dp54.nodes[i], t, h, at.w[i - 1]);
-    bp_lane_explicit_stages(&bp_dp54, BP_DP54_STAGES, &at, work->k, work->y, x, h, next);
-    bp_lane_explicit_error(&bp_dp54, BP_DP54_STAGES, (const double(*)[BP_NX * BP_L])work->k, h, weight, error);
+    bp_lane_times_of(&at, n, angles, method->nodes + 1, method->times, t, h);
+    bp_lane_explicit_stages(method, &at, work->k, work->y, x, h, next);
+    bp_lane_explicit_error(method, (const double(*)[BP_NX * BP_L])work->k, h, weight, error);
 }
 
 /* Columns of [W^-1 A/s | W^-1] for every lane, without pivoting; a lane whose W is not dominated by its diagonal is done anew by itself,
@@ -153,27 +161,27 @@ static inline void bp_lane_factorize(double solve[BP_NX][BP_NQ * BP_L], double *
     }
 }
 
-/* One step of Rodas5P from (t, x) to `next`; linearizes at its start, where w and wt hold. */
-static inline void bp_lane_linear_step(bp_lane_linear *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
+/* One linearly implicit step from (t, x) to `next`; linearizes at its start, where w and wt hold. */
+static inline void bp_lane_linear_step(const bp_rosenbrock_method *restrict method, bp_lane_linear *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
                                        const double *restrict t, const double *restrict x, const double *restrict h,
                                        const double *restrict weight, double *restrict next, double *restrict error)
 {
-    const bp_rosenbrock_method *method = &bp_rodas5p;
     const double(*stages)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])work->u;
     double solve[BP_NX][BP_NQ * BP_L] BP_ALIGNED, s[BP_L] BP_ALIGNED;
     double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
     work->n = n;
+    work->method = method;
     BP_EACH_LANE s[lane] = 1.0 / (h[lane] * method->gamma);
     bp_lane_linearize(n, work->w, work->wt, x, work->dx, work->A, work->B, work->at);
     bp_lane_factorize(solve, work->pivoted, work->A, work->B, s);
     bp_lane_angles_start(angles, n, t, h);
-    for (int i = 1; i <= method->inner; i++) bp_lane_stage(n, angles, method->nodes[i], t, h, work->inner_w[i - 1]);
+    for (int i = 0; i < method->inner; i++) bp_lane_stage(n, angles, method->inner_nodes[i], t, h, work->inner_w[i]);
     /* the end serves several stages and the next step, with the time derivative */
     bp_lane_turn(angles, 1.0, t, h, C, S, time);
     bp_member_stage_rate_turned_lanes(C, S, angles->rate, time, n->u, n->p, n->c, work->end_w, work->end_wt);
-    bp_lane_rosenbrock_stages(method, BP_RODAS5P_STAGES, work, solve[0], work->u, x, h);
-    bp_lane_rosenbrock_end(method, BP_RODAS5P_STAGES, stages, x, next);
-    bp_lane_rosenbrock_error(method, BP_RODAS5P_STAGES, stages, weight, error);
+    bp_lane_rosenbrock_stages(method, work, solve[0], work->u, x, h);
+    bp_lane_rosenbrock_end(method, stages, x, next);
+    bp_lane_rosenbrock_error(method, stages, weight, error);
 }
 
 #endif

@@ -68,8 +68,7 @@ static void reduce_step(bp_run *run, double start, double t, double h)
 {
     if (run->reduction == NULL) return;
     prepare_dense(run, t, h);
-    /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
-    const int parts = run->method == BALLPASS_DOP853 ? 2 : 1;
+    const int parts = bp_parts(bp_methods[run->method].dense_degree);
     const int of_balls = bp_balls_wanted(run->reduction), powers = bp_powers_wanted(run->reduction);
     for (int part = 0; part < parts; part++) {
         const bp_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};

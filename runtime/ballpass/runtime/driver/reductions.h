@@ -1,15 +1,15 @@
 /* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
 
    Channels are the states, then for each bearing four quantities of its balls, each with its value of the most loaded ball: total force,
-   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of DOP853, whose
-   output is of degree seven and not four, as two steps of half the size.
+   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of methods
+   whose dense output is of a degree above four, as two steps of half the size.
 
    Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
-   all methods but DOP853; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
+   all methods but these; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
 
    Extremes: that polynomial is looked at for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
-   evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all methods but
-   DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
+   evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all other
+   methods the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
    an extrapolation across a kink.
 
    What fatigue needs of a bearing's balls follows behind: the mean over them of the third power of their load, of its power 10/3, and the
@@ -92,6 +92,9 @@ static const double BP_BEYOND = 0.5;
 
 /* Parts of a step closer than this are one place. */
 static const double BP_HAIR = 1e-14;
+
+/* Parts that a step is taken in: more than a degree of four five points do not tell. */
+static inline int bp_parts(int dense_degree) { return dense_degree < BP_POINTS ? 1 : 2; }
 
 /* Weights of Boole's rule. */
 static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};

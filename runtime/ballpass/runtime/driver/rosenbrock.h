@@ -12,14 +12,14 @@
    BP_STRETCHED where BP_NAME(position_term)(at, i, c) is added to the velocity of coordinate c there */
 
 /* Stages u of a step of size h from x; `solve`: column j tells what R[j] adds to kv. */
-BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict method, const int stages, const BP_NAME(linear) *at,
+BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict method, const BP_NAME(linear) *at,
                                           const double *restrict solve, double u[][BP_NX * BP_W], const double *restrict x,
                                           const double *restrict step)
 {
     const BP_H h = *(const BP_H *)step, inverse_s = h * method->gamma, inverse_h = 1.0 / h;
     const BP_S(*columns)[BP_VS] = (const BP_S(*)[BP_VS])solve;
     BP_V last[2 * BP_VS];
-    for (int i = 0; i < stages; i++) {
+    for (int i = 0; i < method->stages; i++) {
         double y[BP_NX * BP_W] BP_ALIGNED, dx[BP_NX * BP_W] BP_ALIGNED, R[BP_NX * BP_W] BP_ALIGNED;
         BP_V reached[2 * BP_VS], coupled[2 * BP_VS];
 #pragma GCC unroll 16
@@ -78,19 +78,19 @@ BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict m
 }
 
 /* End of that step, and its scaled error. */
-BP_INLINE void BP_NAME(rosenbrock_end)(const bp_rosenbrock_method *restrict method, const int stages, const double u[][BP_NX * BP_W],
+BP_INLINE void BP_NAME(rosenbrock_end)(const bp_rosenbrock_method *restrict method, const double u[][BP_NX * BP_W],
                                        const double *restrict x, double *restrict next)
 {
     const BP_H one = 1.0 - (BP_H){0.0};
-    BP_NAME(add)(method->weights, stages, u, &one, x, next);
+    BP_NAME(add)(method->weights, method->stages, u, &one, x, next);
 }
 
-BP_INLINE void BP_NAME(rosenbrock_error)(const bp_rosenbrock_method *restrict method, const int stages, const double u[][BP_NX * BP_W],
+BP_INLINE void BP_NAME(rosenbrock_error)(const bp_rosenbrock_method *restrict method, const double u[][BP_NX * BP_W],
                                          const double *restrict weight, double *restrict error)
 {
     const BP_H one = 1.0 - (BP_H){0.0};
     double estimate[BP_NX * BP_W] BP_ALIGNED;
-    BP_NAME(add)(method->error_weights, stages, u, &one, NULL, estimate);
+    BP_NAME(add)(method->error_weights, method->stages, u, &one, NULL, estimate);
     BP_NAME(norm)(estimate, weight, error);
 }
 

@@ -106,16 +106,8 @@ static double place_of(const bp_run *run, double part) { return is_paced(run) ? 
 #define place_of(run, part) (part)
 #endif
 
-static const bp_explicit_method *explicit_method(int method)
-{
-    return method == BALLPASS_DP54 ? &bp_dp54 : method == BALLPASS_DOP853 ? &bp_dop853 : NULL;
-}
-
-static const bp_rosenbrock_method *rosenbrock_method(int method)
-{
-    return method == BALLPASS_RODAS4 ? &bp_rodas4 : method == BALLPASS_RODAS5P ? &bp_rodas5p : NULL;
-}
-
+static const bp_explicit_method *explicit_method(int method) { return bp_methods[method].plain; }
+static const bp_rosenbrock_method *rosenbrock_method(int method) { return bp_methods[method].linear; }
 static int is_explicit(int method) { return explicit_method(method) != NULL; }
 
 static int is_finite(const double *x)
@@ -134,46 +126,16 @@ static int within_reach(const bp_run *run)
     return 1;
 }
 
-static double error_exponent(int method)
-{
-    return is_explicit(method) ? explicit_method(method)->error_exponent : rosenbrock_method(method)->error_exponent;
-}
-
-/* The same for all methods, written out for each: its numbers are then constants. */
-BP_INLINE void prepare_explicit(bp_run *run, const bp_explicit_method *method, double t, double h, const double *lead)
-{
-    bp_times at;
-    bp_times_of(&at, &run->numbers, t, h, method->dense_nodes, method->dense_stages, lead);
-    bp_explicit_dense(method, &at, run->plain.k, run->x, &h, run->next, run->dense);
-}
-
-BP_INLINE double try_explicit(bp_run *run, const bp_explicit_method *method, const int stages, double t, double h)
-{
-    run->result->evaluations += stages;
-    if (is_paced(run))
-        return bp_explicit_step(method, stages, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
-    return bp_explicit_step(method, stages, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
-}
-
-BP_INLINE double try_linear(bp_run *run, const bp_rosenbrock_method *method, const int stages, double t, double h)
-{
-    const double error = bp_rosenbrock_step(method, stages, &run->linear, &run->matrix, &run->numbers, t, run->x, h, run->weight, run->next);
-    run->result->evaluations += stages - 1;
-    run->result->factorizations++;
-    run->result->pivoted += run->matrix.pivoted;
-    return error;
-}
-
 /* Prepare the dense output of the step from (t, x) to (t + h, next). */
 static void prepare_dense(bp_run *run, double t, double h)
 {
-    const double *lead = is_paced(run) ? lead_of(run) : NULL;
-    const double(*u)[BP_NX] = (const double(*)[BP_NX])run->linear.u;
-    switch (run->method) {
-    case BALLPASS_DP54: prepare_explicit(run, &bp_dp54, t, h, lead); break;
-    case BALLPASS_DOP853: prepare_explicit(run, &bp_dop853, t, h, lead); break;
-    case BALLPASS_RODAS4: bp_rosenbrock_dense(&bp_rodas4, u, run->dense); break;
-    default: bp_rosenbrock_dense(&bp_rodas5p, u, run->dense);
+    const bp_explicit_method *plain = explicit_method(run->method);
+    if (plain) {
+        bp_times at;
+        bp_times_of(&at, &run->numbers, t, h, plain->dense_nodes, plain->dense_stages, is_paced(run) ? lead_of(run) : NULL);
+        bp_explicit_dense(plain, &at, run->plain.k, run->x, &h, run->next, run->dense);
+    } else {
+        bp_rosenbrock_dense(rosenbrock_method(run->method), (const double(*)[BP_NX])run->linear.u, run->dense);
     }
 }
 
@@ -182,23 +144,27 @@ static void state_at(const bp_run *run, double part, double *y)
 {
     const double(*dense)[BP_NX] = (const double(*)[BP_NX])run->dense;
     const double theta = place_of(run, part);
-    switch (run->method) {
-    case BALLPASS_DP54: bp_explicit_at(&bp_dp54, dense, run->x, run->next, theta, y); break;
-    case BALLPASS_DOP853: bp_explicit_at(&bp_dop853, dense, run->x, run->next, theta, y); break;
-    case BALLPASS_RODAS4: bp_rosenbrock_at(&bp_rodas4, dense, run->x, run->next, theta, y); break;
-    default: bp_rosenbrock_at(&bp_rodas5p, dense, run->x, run->next, theta, y);
-    }
+    const bp_explicit_method *plain = explicit_method(run->method);
+    if (plain) bp_explicit_at(plain, dense, run->x, run->next, theta, y);
+    else bp_rosenbrock_at(rosenbrock_method(run->method), dense, run->x, run->next, theta, y);
 }
 
 /* Try one step; returns its scaled error. */
 static double try_step(bp_run *run, double t, double h)
 {
-    switch (run->method) {
-    case BALLPASS_DP54: return try_explicit(run, &bp_dp54, BP_DP54_STAGES, t, h);
-    case BALLPASS_DOP853: return try_explicit(run, &bp_dop853, BP_DOP853_STAGES, t, h);
-    case BALLPASS_RODAS4: return try_linear(run, &bp_rodas4, BP_RODAS4_STAGES, t, h);
-    default: return try_linear(run, &bp_rodas5p, BP_RODAS5P_STAGES, t, h);
+    const bp_explicit_method *plain = explicit_method(run->method);
+    const bp_rosenbrock_method *linear = rosenbrock_method(run->method);
+    if (plain) {
+        run->result->evaluations += plain->stages;
+        /* even steps once more: without a pace that no other step has */
+        if (is_paced(run)) return bp_explicit_step(plain, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
+        return bp_explicit_step(plain, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
     }
+    const double error = bp_rosenbrock_step(linear, &run->linear, &run->matrix, &run->numbers, t, run->x, h, run->weight, run->next);
+    run->result->evaluations += linear->stages - 1;
+    run->result->factorizations++;
+    run->result->pivoted += run->matrix.pivoted;
+    return error;
 }
 
 /* The state whose scaled value is worst, or the first that is none. */

@@ -106,7 +106,7 @@ static inline void bp_tangent_rate(const bp_tangent_times *at, int i, double pac
     for (int c = 0; c < BP_NX; c++) ((bp_vector *)k)[c] = pace * ((bp_vector *)k)[c] + stretch * at->points->slope[i][c];
 }
 
-/* The end slope is at the time of the last stage, whose variables are there. */
+/* Where the end slope is at the time of the last stage, its variables are there. */
 static inline void bp_tangent_slope(const bp_tangent_times *at, int i, int time, const double *restrict y, double *restrict k)
 {
     if (time == i - 1) bp_tangent_stage(at, time);
@@ -197,18 +197,19 @@ static inline void bp_explicit_tangent_start(const ballpass_tangents *tangents, 
 
 /* Differentiate an explicit step that was tried; `plain` still holds its slopes.  Block after block, so that one block's numbers stay near
    the processor; what the blocks share is made beforehand. */
-static inline void bp_explicit_tangent_step(const bp_explicit_method *restrict method, const int stages, const ballpass_tangents *tangents,
+static inline void bp_explicit_tangent_step(const bp_explicit_method *restrict method, const ballpass_tangents *tangents,
                                             bp_tangent_block *restrict work, const bp_explicit *restrict plain, const bp_numbers *n,
                                             long segment, double t, const double *restrict x, double h, const double *lead,
                                             const double *restrict next)
 {
     bp_step_points points;
-    bp_sloped_stages(&points, n, t, h, method->nodes + 1, stages - 1, lead);
+    const int stages = method->stages;
+    bp_sloped_stages(&points, n, t, h, method->nodes + 1, method->times, lead);
     for (int i = 1; i <= stages; i++) {
         double *restrict y = points.y[i];
         if (i == stages) memcpy(y, next, sizeof points.y[i]);
         else bp_combine(method->a[i], i, (const double(*)[BP_NX])plain->k, &h, x, y);
-        bp_point_at(&points.at[i], n, points.w[i < stages ? i - 1 : stages - 2], y);
+        bp_point_at(&points.at[i], n, points.w[i < stages ? i - 1 : method->times - 1], y);
         points.slope[i] = plain->k[i];
     }
     for (long b = 0; b < tangents->blocks; b++) {
@@ -217,13 +218,12 @@ static inline void bp_explicit_tangent_step(const bp_explicit_method *restrict m
         for (int k = 0; k < BP_NX; k++)
             for (int l = 0; l < BP_LANES; l++)
                 work[b].k[0][k * BP_LANES + l] = pace * work[b].rate[k * BP_LANES + l] + work[b].stretch[l] * plain->k[0][k];
-        bp_tangent_explicit_stages(method, stages, &at, work[b].k, work[b].argument, bp_tangent_state(tangents, b), &h, work[b].next);
+        bp_tangent_explicit_stages(method, &at, work[b].k, work[b].argument, bp_tangent_state(tangents, b), &h, work[b].next);
     }
 }
 
 /* Differentiate a linearly implicit step that was tried. */
-static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restrict method, const int stages,
-                                              const ballpass_tangents *tangents, bp_tangent_block *restrict work,
+static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restrict method, const ballpass_tangents *tangents, bp_tangent_block *restrict work,
                                               const bp_linear *restrict plain, const bp_matrix *restrict matrix, const bp_numbers *n,
                                               long segment, double t, const double *restrict x, double h)
 {
@@ -231,10 +231,10 @@ static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restri
     bp_step_points points;
     points.plain = plain;
     points.nodes = method->nodes;
-    bp_sloped_stages(&points, n, t, h, method->nodes + 1, stages - 1, NULL);
+    bp_sloped_stages(&points, n, t, h, method->nodes + 1, method->stages - 1, NULL);
     bp_point_at(&points.at[0], n, plain->w, x);
     points.slope[0] = plain->dx;
-    for (int i = 1; i < stages; i++) {
+    for (int i = 1; i < method->stages; i++) {
         double *restrict y = points.y[i], *restrict rate = points.rate[i];
         bp_add(method->a[i], i, (const double(*)[BP_NX])plain->u, &one, x, y);
         bp_point_at(&points.at[i], n, points.w[i - 1], y);
@@ -248,8 +248,8 @@ static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restri
         bp_tangent_block *restrict own = &work[b];
         bp_stage_rate_tangent_lanes(t, n->u, n->p, n->c, own->moved, at.d.u, at.d.p, at.d.c, own->w, own->wt);
         bp_linearize_tangent(&points.at[0], n, &at.d, plain->wt, own->w, own->wt, xd, own->A, own->B, own->at);
-        bp_tangent_rosenbrock_stages(method, stages, &at, matrix->solve[0], own->k, xd, &h);
-        bp_tangent_rosenbrock_end(method, stages, (const double(*)[BP_NX * BP_LANES])own->k, xd, own->next);
+        bp_tangent_rosenbrock_stages(method, &at, matrix->solve[0], own->k, xd, &h);
+        bp_tangent_rosenbrock_end(method, (const double(*)[BP_NX * BP_LANES])own->k, xd, own->next);
     }
 }
 
@@ -264,8 +264,8 @@ static inline double bp_tangent_error(const ballpass_tangents *tangents, const b
         const double *restrict weight = tangents->weight + b * (BP_NX * BP_LANES);
         const double(*k)[BP_NX * BP_LANES] = (const double(*)[BP_NX * BP_LANES])work[b].k;
         double error[BP_LANES], size[BP_LANES];
-        if (plain) bp_tangent_explicit_error(plain, plain->stages, k, &h, weight, error);
-        else bp_tangent_rosenbrock_error(linear, linear->stages, k, weight, error);
+        if (plain) bp_tangent_explicit_error(plain, k, &h, weight, error);
+        else bp_tangent_rosenbrock_error(linear, k, weight, error);
         bp_tangent_norm(bp_tangent_state(tangents, b), weight, size);
         for (int l = 0; l < BP_LANES; l++) {
             const double grown = tangents->rtol * size[l], relative = error[l] / (grown > 1.0 ? grown : 1.0);

@@ -5,7 +5,7 @@
 #include <float.h>
 #include <stddef.h>
 
-#include "methods.h"
+#include "method_tables.h"
 #include "model.h"
 #include "sqrt_time.h"
 
@@ -32,7 +32,7 @@ typedef struct {
 /* What a linearly implicit step starts from and keeps when it is rejected. */
 typedef struct {
     const bp_numbers *n;
-    int inner;
+    const bp_rosenbrock_method *method;
     double w[BP_NW], wt[BP_NW];         /* stage variables at the start */
     double end_w[BP_NW], end_wt[BP_NW]; /* and at the end of the step tried */
     double inner_w[BP_METHOD_STAGES][BP_NW];
@@ -59,7 +59,7 @@ BP_INLINE void bp_linear_slope(const bp_linear *at, int i, const double *restric
 {
     if (i == 0)
         for (int k = 0; k < BP_NX; k++) dx[k] = at->dx[k];
-    else bp_rate(at->n, i <= at->inner ? at->inner_w[i - 1] : at->end_w, y, dx);
+    else bp_rate(at->n, at->method->place[i] < at->method->inner ? at->inner_w[at->method->place[i]] : at->end_w, y, dx);
 }
 
 BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
@@ -124,15 +124,14 @@ BP_INLINE void bp_times_of(bp_times *restrict at, const bp_numbers *n, double t,
 }
 
 /* One step of size h from (t, x) to `next`, the end slope included; returns the scaled error. */
-BP_INLINE double bp_explicit_step(const bp_explicit_method *restrict method, const int stages, bp_explicit *restrict work,
-                                  const bp_numbers *n, double t, const double *restrict x, double h, const double *restrict lead,
+BP_INLINE double bp_explicit_step(const bp_explicit_method *restrict method, bp_explicit *restrict work, const bp_numbers *n, double t, const double *restrict x, double h, const double *restrict lead,
                                   const double *restrict weight, double *restrict next)
 {
     bp_times at;
     double error;
-    bp_times_of(&at, n, t, h, method->nodes + 1, stages - 1, lead);
-    bp_explicit_stages(method, stages, &at, work->k, work->y, x, &h, next);
-    bp_explicit_error(method, stages, (const double(*)[BP_NX])work->k, &h, weight, &error);
+    bp_times_of(&at, n, t, h, method->nodes + 1, method->times, lead);
+    bp_explicit_stages(method, &at, work->k, work->y, x, &h, next);
+    bp_explicit_error(method, (const double(*)[BP_NX])work->k, &h, weight, &error);
     return error;
 }
 
@@ -175,7 +174,7 @@ static inline int bp_factorize(bp_matrix *restrict m, const double *restrict A, 
 }
 
 /* One step of size h from (t, x) to `next`; returns the scaled error, negative where W is singular. */
-BP_INLINE double bp_rosenbrock_step(const bp_rosenbrock_method *restrict method, const int stages, bp_linear *restrict work,
+BP_INLINE double bp_rosenbrock_step(const bp_rosenbrock_method *restrict method, bp_linear *restrict work,
                                     bp_matrix *restrict matrix, const bp_numbers *n, double t, const double *restrict x, double h,
                                     const double *restrict weight, double *restrict next)
 {
@@ -183,11 +182,11 @@ BP_INLINE double bp_rosenbrock_step(const bp_rosenbrock_method *restrict method,
     if (!bp_factorize(matrix, work->A, work->B, 1.0 / (h * method->gamma))) return -1.0;
     /* the times inside the step at once; its end, which serves several stages and the next step, with the time derivative */
     work->n = n;
-    work->inner = method->inner;
-    bp_stages_and_end(n, t, h, method->nodes + 1, method->inner, work->inner_w, work->end_w, work->end_wt);
-    bp_rosenbrock_stages(method, stages, work, matrix->solve[0], work->u, x, &h);
-    bp_rosenbrock_end(method, stages, (const double(*)[BP_NX])work->u, x, next);
-    bp_rosenbrock_error(method, stages, (const double(*)[BP_NX])work->u, weight, &error);
+    work->method = method;
+    bp_stages_and_end(n, t, h, method->inner_nodes, method->inner, work->inner_w, work->end_w, work->end_wt);
+    bp_rosenbrock_stages(method, work, matrix->solve[0], work->u, x, &h);
+    bp_rosenbrock_end(method, (const double(*)[BP_NX])work->u, x, next);
+    bp_rosenbrock_error(method, (const double(*)[BP_NX])work->u, weight, &error);
     return error;
 }
 

@@ -17,7 +17,7 @@
 static double estimate_step(bp_run *run, double t, double longest)
 {
     run->result->evaluations += 2;
-    return bp_first_step(&run->numbers, t, run->x, longest, run->weight, error_exponent(run->method));
+    return bp_first_step(&run->numbers, t, run->x, longest, run->weight, bp_methods[run->method].error_exponent);
 }
 
 /* The family for the coming segment. */
@@ -25,7 +25,7 @@ static int choose_method(bp_run *run, double t)
 {
     bp_linear_start(&run->linear, &run->numbers, t, run->x, 1);
     run->result->evaluations++;
-    return bp_starts_linear(&run->seen, run->linear.A, run->linear.B) ? BALLPASS_RODAS5P : BALLPASS_DP54;
+    return bp_starts_linear(&run->seen, run->linear.A, run->linear.B) ? BP_AUTO_LINEAR : BP_AUTO_LOW;
 }
 
 typedef struct {
@@ -33,12 +33,12 @@ typedef struct {
     double t;
 } bp_step_start;
 
-static double stable_step(void *from, int dp54)
+static double stable_step(void *from, const bp_stability *limit)
 {
     const bp_step_start *start = from;
     bp_run *run = start->run;
     if (is_explicit(run->method)) linearize(run, start->t, 1);
-    return bp_stable_step(run->linear.A, run->linear.B, dp54);
+    return bp_stable_step(run->linear.A, run->linear.B, limit);
 }
 
 /* The method for the next step, from the accepted one of size h at time t. */
@@ -216,7 +216,7 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
         if (h != tried) last = 0;
         const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run), rejected_before = rejected_last;
         double factor;
-        bp_step_factor(error_exponent(run->method), &error, &accepted, &rejected_before, &run->last_error, &factor);
+        bp_step_factor(bp_methods[run->method].error_exponent, &error, &accepted, &rejected_before, &run->last_error, &factor);
         if (accepted != 0.0) {
             result->steps++;
             rejected_last = 0;
@@ -301,7 +301,7 @@ static int run_all(bp_run *run, const ballpass_options *options, const double *p
     run->last_error = BP_LOG_SMALL_ERROR;
     run->seen = (bp_seen){.least = INFINITY};
     run->method = options->method;
-    if (options->method < BALLPASS_AUTO || options->method > BALLPASS_DOP853) return result->status = BALLPASS_BAD_ARGUMENT;
+    if (options->method < BALLPASS_AUTO || options->method >= BP_METHODS) return result->status = BALLPASS_BAD_ARGUMENT;
     if (!bp_are_limits(options->first_step, options->smallest_step, options->largest_step)) return result->status = BALLPASS_BAD_ARGUMENT;
     for (int k = 0; k < BP_NX; k++) {
         run->weight[k] = 1.0 / options->tolerance[k];

@@ -15,13 +15,7 @@
 #define BALLPASS_EXPORT __attribute__((visibility("default")))
 #endif
 
-enum ballpass_method {
-    BALLPASS_AUTO = 0,
-    BALLPASS_RODAS4 = 1,
-    BALLPASS_RODAS5P = 2,
-    BALLPASS_DP54 = 3,
-    BALLPASS_DOP853 = 4
-};
+enum { BALLPASS_AUTO = 0 }; /* the choice among methods; the others have the numbers of method_tables.h */
 
 enum ballpass_status {
     BALLPASS_DONE = 0,
@@ -35,7 +29,7 @@ enum ballpass_status {
 };
 
 typedef struct {
-    int method;              /* enum ballpass_method */
+    int method;              /* its number */
     long max_steps;          /* accepted and rejected */
     double first_step;       /* [s]; 0: estimated */
     double smallest_step;    /* [s] */

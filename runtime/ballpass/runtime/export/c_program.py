@@ -33,6 +33,7 @@ from ballpass.runtime.export.scene_numbers import (
 from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
 from ballpass.runtime.run.locating import has_kinks
 
 #: What of the compiler's flags makes a shared library, or is overruled.
@@ -95,6 +96,7 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
         "scene.c": scene_source(manifest),
         "constants.c": constants_source(model),
         "outputs.c": outputs_source(model),
+        METHOD_TABLES: method_tables(),
     }
     if margins_of(manifest):
         texts["margins.c"] = margins_source(model)

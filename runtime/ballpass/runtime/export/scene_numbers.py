@@ -13,9 +13,9 @@ from pathlib import Path
 import casadi
 
 from ballpass.runtime.contract import DRIVER_ACCELERATION, InputInfo, Manifest, MarginInfo, VariableInfo
+from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.locating import has_kinks, tight_below
 
 #: C sources that are the same for every scene, and templates of those that are not.
@@ -102,6 +102,7 @@ def scene_header(manifest: Manifest) -> str:
         "SCENE_CONSTANTS": len(manifest.constants),
         "SCENE_RELATIONS": len(manifest.relations),
         "SCENE_MARGINS": len(margins_of(manifest)),
+        "SCENE_METHODS": 1 + len(METHODS),
         "SCENE_OUTPUTS": sum(info.size for info in computed_outputs(manifest)),
     }
     kinks = "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
@@ -124,7 +125,7 @@ def scene_source(manifest: Manifest) -> str:
     elif manifest.bearing is not None:
         speed = place[manifest.bearing.ring_speed]
     run = manifest.run
-    method = run.method.removeprefix("stepper-") if run.method in STEPPERS and run.method != "stepper" else "auto"
+    methods = ("auto", *METHODS)
     changing = varying(manifest)
     parameters = [
         f"    {{{_string(p.name)}, {_string(p.unit)}, {_string(p.description)}, {p.default!r}, "
@@ -156,7 +157,9 @@ def scene_source(manifest: Manifest) -> str:
         DURATION=repr(float(run.duration or 0.0)),
         RTOL=repr(run.rtol),
         SAMPLES=str(run.samples_per_cycle),
-        METHOD=_string(method),
+        METHOD=_string(STEPPERS.get(run.method, "auto")),
+        METHODS=_listed(_string(name) for name in methods),
+        LISTED=_string(", ".join(methods)),
     )
 
 

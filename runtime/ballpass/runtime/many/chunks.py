@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS, End
+from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.locating import Kinks
 from ballpass.runtime.run.loop import STATUS_OF_END, ReductionRow, RunFailed, RunUnderWay
@@ -216,7 +217,7 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
         if work.stop.value:
             break
         driver.run(
-            METHODS[work.method],
+            STEPPERS[work.method],
             arrays,
             x,
             work.rtol * magnitude,

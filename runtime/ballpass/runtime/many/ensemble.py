@@ -26,10 +26,8 @@ from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
 from ballpass.runtime.many.member_values import measure_members
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
-from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 from ballpass.runtime.quantity.layout import is_reduced, needs
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
@@ -252,7 +250,7 @@ def simulate_many(
     members = make_members(model, columns, bounded=bounded)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
-    in_lanes = driver is not None and lanes and at_kinks != LOCATED and METHODS[chosen_method] in LANE_FAMILIES
+    in_lanes = driver is not None and lanes and at_kinks != LOCATED
     by_steps = [item for item in chosen if is_reduced(model, item)]
     others = [item for item in chosen if not is_reduced(model, item)]
     reduced = {name for item in by_steps for name in needs(item)}

@@ -120,6 +120,7 @@ def compile_sources(
     *,
     label: str = "model",
     headers: Sequence[Path] = (),
+    made_headers: Mapping[str, str] | None = None,
     include: Sequence[Path] = (),
     flags: tuple[str, ...] = (),
     digests: Mapping[Path, str] | None = None,
@@ -134,6 +135,7 @@ def compile_sources(
     compiler : see `find_compiler`
     label : start of the library's file name
     headers : what the sources include, which enters the key as well; no two files of one name
+    made_headers : texts of further headers by name, which are part of the key as well
     include : absolute folders in which further headers are found
     flags : further flags, behind the compiler's own
     digests : sha256 that files must have, by path; those that are not named may have any
@@ -147,7 +149,8 @@ def compile_sources(
     """
     compiler = replace(compiler, flags=(*compiler.flags, *flags))
     contents = {path: _content(path, digests or {}) for path in (*sources, *headers)}
-    key = _key([contents[path] for path in (*sources, *headers)], compiler)
+    contents |= {Path(name): text.encode() for name, text in (made_headers or {}).items()}
+    key = _key(list(contents.values()), compiler)
     name = f"{_file_name(label)}-{key[:32]}"
     ready = _find(_cache_folder(), name)
     if ready is not None:

@@ -18,6 +18,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler
+from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
 
 #: Folder with the C sources of the drivers.
 DRIVER = Path(__file__).parent.parent / "driver"
@@ -57,7 +58,7 @@ class DriverSources:
     flags: tuple[str, ...]
 
 
-_DERIVATIVES = ("kernels.h", "methods.h", "tangents.h")
+_DERIVATIVES = ("kernels.h", "tangents.h")
 _REDUCTIONS = (*_DERIVATIVES, "ensemble_kernels.h")
 
 #: Drivers of single runs: with reductions, which cost a run that does not ask for them nothing that can be measured;
@@ -100,6 +101,7 @@ def compile_driver(folder: Path, manifest: Manifest, compiler: Compiler, driver:
         compiler,
         label=f"{manifest.scene}-{driver.kind}",
         headers=[*sorted(DRIVER.glob("*.h")), *(place / name for name in driver.headers)],
+        made_headers={METHOD_TABLES: method_tables()},
         include=(place, DRIVER),
         flags=(*FLAGS, *own, *driver.flags),
         digests=digests_of(place, manifest),

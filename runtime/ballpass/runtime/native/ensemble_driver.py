@@ -29,13 +29,10 @@ from ballpass.runtime.native.driver_library import (
 )
 from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, Family, Stepper
+from ballpass.runtime.native.stepper import MAX_STEPS, NAMES, RESULT, Stepper
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
-
-#: Families of methods that advance in lanes.
-LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
 
 
 class _EnsembleOptions(ctypes.Structure):
@@ -139,7 +136,7 @@ class EnsembleDriver:
 
     def run(
         self,
-        family: Family,
+        method: str,
         members: MemberArrays,
         x: np.ndarray,
         tolerance: np.ndarray,
@@ -154,7 +151,7 @@ class EnsembleDriver:
 
         Parameters
         ----------
-        family : one of `LANE_FAMILIES`
+        method : its name, or ``auto``
         x : states at the start, shape (members, states); on return those reached
         tolerance : error allowed in a step, shape (members, states)
         reductions : rows to add to, or None
@@ -167,13 +164,11 @@ class EnsembleDriver:
         -------
         array of `RESULT`, shape (members,)
         """
-        if family not in LANE_FAMILIES:
-            raise ValueError(f"{family!r} does not advance in lanes: {', '.join(f.name for f in LANE_FAMILIES)} do.")
         count = len(x)
         carried = self.carry(count) if carried is None else carried
         limits = np.full(count, max_steps, dtype=ctypes.c_long)
         options = _EnsembleOptions(
-            method=int(family),
+            method=NAMES.index(method),
             resume=int(carried.begun),
             max_steps=address(limits, ctypes.c_long),
             stop=ctypes.pointer(stop),

@@ -7,13 +7,13 @@ any number of segments; the interpreter is free meanwhile, and calls from severa
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import (
     BYTES,
@@ -31,24 +31,8 @@ from ballpass.runtime.native.driver_library import (
 MAX_STEPS = 20_000_000
 
 
-class Family(IntEnum):
-    """Methods of the driver; the numbers are those of stepper.h."""
-
-    AUTO = 0
-    RODAS4 = 1
-    RODAS5P = 2
-    DP54 = 3
-    DOP853 = 4
-
-
-#: Names users give, and the driver's methods.  Plain ``stepper`` lets the driver choose.
-METHODS: Mapping[str, Family] = {
-    "stepper": Family.AUTO,
-    "stepper-rodas4": Family.RODAS4,
-    "stepper-rodas5p": Family.RODAS5P,
-    "stepper-dp54": Family.DP54,
-    "stepper-dop853": Family.DOP853,
-}
+#: Methods by their numbers in C.
+NAMES = ("auto", *METHODS)
 
 
 class End(IntEnum):
@@ -127,7 +111,7 @@ class Outcome:
     Attributes
     ----------
     end : how it ended
-    family : method of the last segment
+    method : name of the method of the last segment
     state : index of the state that ended it, -1 if none
     written : output times reached
     steps, rejected, evaluations, factorizations, pivoted, switches, kinks : counts
@@ -137,7 +121,7 @@ class Outcome:
     """
 
     end: End
-    family: Family
+    method: str
     state: int
     written: int
     steps: int
@@ -153,7 +137,7 @@ class Outcome:
 
 
 #: Fields of an outcome that are those of C.
-_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "family", "ends"))
+_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "method", "ends"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -243,7 +227,7 @@ class Stepper:
     def run(
         self,
         *,
-        family: Family,
+        method: str,
         tolerance: np.ndarray,
         p: np.ndarray,
         c: np.ndarray,
@@ -265,6 +249,7 @@ class Stepper:
 
         Parameters
         ----------
+        method : its name, or ``auto``
         tolerance : error allowed in a step, shape (states,)
         p, c : parameters and derived constants
         x : state at the start, shape (states,); on return that at the end
@@ -284,7 +269,15 @@ class Stepper:
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
         ended = ctypes.c_long(0)
         options = _Options(
-            *(family, max_steps, first_step, smallest_step, largest_step, address(tolerance), address(reduction)),
+            *(
+                NAMES.index(method),
+                max_steps,
+                first_step,
+                smallest_step,
+                largest_step,
+                address(tolerance),
+                address(reduction),
+            ),
             before=address(before),
             ends=address(ends),
             ended=ctypes.addressof(ended),
@@ -311,7 +304,7 @@ class Stepper:
             )
             self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
         told = {name: getattr(result, name) for name in _TOLD}
-        return Outcome(end=End(result.status), family=Family(result.method), ends=ended.value, **told)
+        return Outcome(end=End(result.status), method=NAMES[result.method], ends=ended.value, **told)
 
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float

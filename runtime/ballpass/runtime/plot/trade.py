@@ -10,17 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ballpass.runtime.certify.trade_report import Measured, Trade
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, log_ticks, new_figure, styled
 from ballpass.runtime.run.locating import LOCATED
 
-#: Marker and colour of each method; shapes tell them apart in grey as well, and open ones locate kinks.
-_METHODS: dict[str, tuple[str, str]] = {
-    "stepper": ("o", INK),
-    "stepper-rodas4": ("s", SAND),
-    "stepper-rodas5p": ("D", SIGNAL),
-    "stepper-dp54": ("p", INK),
-    "stepper-dop853": ("^", GREY),
-}
+#: Markers and colours of methods by turns; shapes tell them apart in grey as well, and open ones locate kinks.
+_STYLES = tuple(zip("osDp^vP*", (INK, SAND, SIGNAL, INK, GREY, SAND, SIGNAL, GREY), strict=True))
 
 #: Decades the axis is lengthened at most to show where the reference is uncertain.
 _DECADES = 4.0
@@ -37,7 +32,7 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
             groups.setdefault((one.way.method, one.way.kinks), []).append(one)
     for (method, kinks), ones in groups.items():
         ones.sort(key=lambda m: -m.way.rtol)
-        marker, colour = _METHODS[method]
+        marker, colour = _STYLES[list(STEPPERS).index(method) % len(_STYLES)]
         located = kinks == LOCATED
         axes.plot(
             *_points(trade, quantity, ones),

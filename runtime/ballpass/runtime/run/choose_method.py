@@ -9,10 +9,10 @@ import warnings
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
 
 #: Linearly implicit steps suit above this ratio of fastest decay to fastest natural frequency.  Measured on a press
 #: with four degrees of freedom and eight balls at rtol 1e-6: explicit steps take the same time at a ratio of 2, twice

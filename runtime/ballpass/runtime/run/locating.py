@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.driver_library import SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.method_registry import CHOICE, STEPPERS
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
+from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
 from ballpass.runtime.run.failure_location import FailureLocation, locate_failure
 from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import LOCATED, stepper_for
@@ -217,7 +218,7 @@ class RunUnderWay:
                 arguments.setdefault("output_states", None)
                 more = min(STEPS_A_CALL, allowed.left)
                 outcome = stepper.run(
-                    family=run.family,
+                    method=STEPPERS[run.method],
                     tolerance=run.tolerance,
                     p=run.numbers.p,
                     c=run.numbers.c,
@@ -261,8 +262,8 @@ class RunUnderWay:
         self.steps += outcome.steps
         self.rejected += outcome.rejected
         self.located += outcome.kinks if self.run.kinks == LOCATED else 0
-        if self.run.family is Family.AUTO:
-            self.families.append(outcome.family.name.lower())
+        if self.run.method == CHOICE:
+            self.families.append(outcome.method)
 
     def _failure(self, outcome: Outcome, directions: Directions | None) -> RunFailed:
         run = self.run

@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.native.stepper import Family
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import choose_method, stepper_method
 from ballpass.runtime.run.locating import Kinks, choose_kinks
@@ -77,11 +76,6 @@ class Run:
     def tolerance(self) -> np.ndarray:
         """Error allowed in a step, shape (states,)."""
         return np.asarray(self.rtol * self.magnitude)
-
-    @property
-    def family(self) -> Family:
-        """Method of the project's own stepper."""
-        return STEPPERS[self.method]
 
     def by(self, method: str, rtol: float, kinks: Kinks) -> Run:
         """The same run by another method of the stepper."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import kinks_with_derivatives, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, Request
@@ -76,9 +76,9 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
     kinks = kinks_with_derivatives(request.kinks, model.manifest)
     refuse_jumps(model.manifest, "sensitivities")
     method = request.method or model.manifest.run.method
-    if method not in ("auto", *METHODS):
+    if method not in ("auto", *STEPPERS):
         raise RequestError(
-            f"sensitivities: the method {method!r} was given; allowed are auto, {', '.join(METHODS)}, which "
+            f"sensitivities: the method {method!r} was given; allowed are auto, {', '.join(STEPPERS)}, which "
             "differentiate their own steps."
         )
     if not names:

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.casadi_run import integrate
 from ballpass.runtime.run.failure_location import locate_failure

@@ -297,8 +297,8 @@ def load_model(
     ----------
     overrides : numbers of ``--set``; refused where the linkage locks with them
     """
+    from ballpass.runtime.contract.method_registry import STEPPERS
     from ballpass.runtime.model import load
-    from ballpass.runtime.native.stepper import METHODS as STEPPERS
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
 
     def compiled(folder: Path) -> Model:

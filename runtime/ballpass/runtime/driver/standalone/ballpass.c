@@ -217,11 +217,10 @@ static double time_of_turn(const double *values)
 
 ballpass_request ballpass_default(const ballpass *s)
 {
-    static const char *const METHODS[] = {"auto", "rodas4", "rodas5p", "dp54", "dop853"};
     ballpass_request asked = {0.0, scene_duration, scene_rtol, 0, -1};
     if (scene_cycles > 0.0) asked.end = scene_cycles * time_of_turn(s->run.values);
-    for (int k = 0; k < (int)(sizeof METHODS / sizeof *METHODS); k++)
-        if (!strcmp(scene_method, METHODS[k])) asked.method = k;
+    for (int k = 0; k < SCENE_METHODS; k++)
+        if (!strcmp(scene_method, scene_methods[k])) asked.method = k;
     return asked;
 }
 
@@ -314,8 +313,8 @@ static void check_request(ballpass *s, const ballpass_request *asked)
     }
     if (!(asked->rtol >= SMALLEST_RTOL && asked->rtol <= LARGEST_RTOL))
         add_fault(&s->faults, "tolerance: %g was given. Allowed: a number from 1e-13 to 0.1.", asked->rtol);
-    if (asked->method < BALLPASS_AUTO || asked->method > BALLPASS_DOP853)
-        add_fault(&s->faults, "method: %d was given. Allowed: 0 to 4.", asked->method);
+    if (asked->method < BALLPASS_AUTO || asked->method >= SCENE_METHODS)
+        add_fault(&s->faults, "method: %d was given. Allowed: 0 to %d.", asked->method, SCENE_METHODS - 1);
 }
 
 /* Values that the scene file could not have, all of them. */

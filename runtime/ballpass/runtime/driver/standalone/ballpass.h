@@ -35,7 +35,7 @@ enum ballpass_answer {
 typedef struct {
     double begin, end; /* of the run [s]; magnitudes, which tolerances are relative to, are those of this time */
     double rtol;       /* error allowed in a step, relative to the magnitudes of the states; 1e-13 to 0.1 */
-    int method;        /* 0 auto, 1 rodas4, 2 rodas5p, 3 dp54, 4 dop853 */
+    int method;        /* 0 auto; the others from 1 on, in the order of --help */
     int located;       /* 1: steps end on the kinks of the laws; 0: they are stepped over; -1: as in Python, by the tolerance */
 } ballpass_request;
 

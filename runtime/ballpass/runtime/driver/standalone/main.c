@@ -13,9 +13,6 @@
 static const double SMALLEST_RTOL = 1e-13, LARGEST_RTOL = 1e-1;
 static const double TURN = 6.283185307179586476925286766559;
 
-/* As ballpass_request counts them. */
-static const char *const METHODS[] = {"auto", "rodas4", "rodas5p", "dp54", "dop853"};
-
 typedef struct {
     double cycles, duration; /* one of them above zero */
     int turns_given, time_given;
@@ -32,7 +29,7 @@ static void help(const char *program)
     printf("  --duration T     time [s], instead of turns\n");
     printf("  --rtol R         error allowed in a step, relative to the magnitudes of the states; default %g\n", scene_rtol);
     printf("  --samples N      samples in a turn (in the whole run where nothing turns); default %ld\n", scene_samples);
-    printf("  --method M       auto, rodas4, rodas5p, dp54, dop853; default %s\n", scene_method);
+    printf("  --method M       %s; default %s\n", scene_methods_listed, scene_method);
     printf("  --kinks HOW      stepped-over, or located: steps end where a law has a kink or jump; default: located by method\n                   auto at an --rtol of %g and below, else stepped-over\n", SCENE_TIGHT);
     printf("  --list           print parameters with values, units and meaning, and stop\n\n");
     printf("Values of parameters are numbers in SI units.\n");
@@ -75,12 +72,12 @@ static int set_option(request *asked, const char *name, const char *text)
 {
     double value;
     if (!strcmp(name, "--method")) {
-        for (int k = 0; k < (int)(sizeof METHODS / sizeof *METHODS); k++)
-            if (!strcmp(text, METHODS[k])) {
+        for (int k = 0; k < SCENE_METHODS; k++)
+            if (!strcmp(text, scene_methods[k])) {
                 asked->method = k;
                 return 0;
             }
-        return refuse(name, text, "auto, rodas4, rodas5p, dp54, dop853.");
+        return refuse(name, text, scene_methods_listed);
     }
     if (!strcmp(name, "--kinks")) {
         asked->located = !strcmp(text, "located");

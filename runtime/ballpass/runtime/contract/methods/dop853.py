@@ -1,133 +1,18 @@
-"""Which explicit methods does the stepper have?  Dormand–Prince 5(4) and DOP853, for light damping.
+"""DOP853: the method of order 8 with twelve stages of Dormand and Prince as E. Hairer arranged it, with embedded
+solutions of orders 5 and 3 whose estimates are combined so that the error behaves like h**8, and a dense output of
+order 7 with three further stages.
 
-The first is of use at moderate, the second at tight tolerances.
+E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, sections II.5, II.6
+and II.10, doi:10.1007/978-3-540-78862-1, and its code DOP853.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 
-from ballpass.derive.methods.tableaus import Row, Rows, require_lengths, row_of, rows_of
+from ballpass.runtime.contract.tableaus import ErrorEstimate, ExplicitTableau, StabilityLimits, row_of, rows_of
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorEstimate:
-    """Error weights ``e = b - b_hat`` of one embedded solution.
-
-    Attributes
-    ----------
-    weights : e_i of the stages and, last, of the slope at the end of the step; shape (s + 1,)
-    order : order of the embedded solution
-    share : its share in the denominator of the combined error, see `ExplicitTableau`
-    """
-
-    weights: Row
-    order: int
-    share: Fraction = Fraction(1)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExplicitTableau:
-    """An explicit Runge–Kutta pair with dense output.
-
-    ``k_i = f(t + c_i h, y0 + h sum_j a_ij k_j)`` for s stages, ``y1 = y0 + h sum_i b_i k_i``.  Stage s + 1 is the end
-    slope ``f(t + h, y1)``, the first stage of the next step.  The r stages of the dense output follow; they are needed
-    only in steps that contain a requested point.
-
-    Error: with ``E_m = h sum_i e_mi k_i`` and the root mean square norm scaled by ``atol + rtol |y|``, the error of the
-    step is ``|E_1|**2 / sqrt(sum_m share_m |E_m|**2)``; for a single estimate that is ``|E_1|``.
-
-    Dense output: with ``Delta = y1 - y0``, ``F1 = h k_1 - Delta``, ``F2 = 2 Delta - h (k_1 + k_end)``, ``F3, F4, ...``
-    from `dense_rows` and ``x = 1 - theta``,
-
-        y(t + theta h) = y0 + theta (Delta + x (F1 + theta (F2 + x (F3 + theta (F4 + x (...))))))
-
-    so that it meets y0, y1 and the slopes there whatever the figures are.
-
-    Attributes
-    ----------
-    name : name of the method
-    nodes : c_i, shape (s,)
-    matrix : a_ij, s rows, row i with i figures (0-based)
-    weights : b_i, shape (s,)
-    error_estimates : at least one; the first has share 1
-    dense_nodes : c_i of the stages of the dense output, shape (r,)
-    dense_matrix : a_ij of these, r rows, row i with s + 1 + i figures
-    dense_rows : d_mi of ``F_(m + 3) = h sum_i d_mi k_i``, each of shape (s + 1 + r,)
-    source : where the figures are printed
-
-    Raises
-    ------
-    TableauError : a row has too many or too few figures
-    """
-
-    name: str
-    nodes: Row
-    matrix: Rows
-    weights: Row
-    error_estimates: tuple[ErrorEstimate, ...]
-    dense_nodes: Row
-    dense_matrix: Rows
-    dense_rows: Rows
-    source: str
-
-    def __post_init__(self) -> None:
-        stages, all_stages = self.stages, self.stages + 1 + len(self.dense_nodes)
-        estimates = [estimate.weights for estimate in self.error_estimates]
-        require_lengths(
-            self.name,
-            ("matrix", self.matrix, range(stages)),
-            ("weights", (self.weights,), (stages,)),
-            ("error weights", estimates, (stages + 1,) * len(estimates)),
-            ("dense_matrix", self.dense_matrix, range(stages + 1, all_stages)),
-            ("dense_rows", self.dense_rows, (all_stages,) * len(self.dense_rows)),
-        )
-
-    @property
-    def stages(self) -> int:
-        """Slopes that form the new solution; the first of them is known from the step before."""
-        return len(self.nodes)
-
-    @property
-    def error_exponent(self) -> int:
-        """q in error ∝ h**q, for the step size controller."""
-        lowest = min(estimate.order for estimate in self.error_estimates)
-        return 2 * (self.error_estimates[0].order + 1) - (lowest + 1)
-
-
-#: Dormand–Prince 5(4): six stages, the end slope in the error estimate, dense output of order 4 without further stages.
-#:
-#: J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19–26,
-#: doi:10.1016/0771-050X(80)90013-3.  Dense output: L. F. Shampine, Some practical Runge–Kutta formulas, Math. Comp. 46
-#: (1986) 135–150, doi:10.1090/S0025-5718-1986-0815836-3, in the nested form of E. Hairer, S. P. Nørsett, G. Wanner,
-#: Solving Ordinary Differential Equations I, Springer 1993, section II.6, doi:10.1007/978-3-540-78862-1.
-DORMAND_PRINCE_54 = ExplicitTableau(
-    name="Dormand–Prince 5(4)",
-    nodes=row_of("0 1/5 3/10 4/5 8/9 1"),
-    matrix=rows_of(
-        "",
-        "1/5",
-        "3/40 9/40",
-        "44/45 -56/15 32/9",
-        "19372/6561 -25360/2187 64448/6561 -212/729",
-        "9017/3168 -355/33 46732/5247 49/176 -5103/18656",
-    ),
-    weights=row_of("35/384 0 500/1113 125/192 -2187/6784 11/84"),
-    error_estimates=(
-        ErrorEstimate(weights=row_of("71/57600 0 -71/16695 71/1920 -17253/339200 22/525 -1/40"), order=4),
-    ),
-    dense_nodes=(),
-    dense_matrix=(),
-    dense_rows=rows_of(
-        "-12715105075/11282082432 0 87487479700/32700410799 -10690763975/1880347072 701980252875/199316789632"
-        " -1453857185/822651844 69997945/29380423",
-    ),
-    source="Dormand & Prince 1980, doi:10.1016/0771-050X(80)90013-3;"
-    " Shampine 1986, doi:10.1090/S0025-5718-1986-0815836-3",
-)
-
-_DOP853_WEIGHTS = row_of(
+_WEIGHTS = row_of(
     "0.0542937341165687622380535766363 0 0 0 0 4.45031289275240888144113950566"
     " 1.89151789931450038304281599044 -5.8012039600105847814672114227"
     " 0.31116436695781989440891606237 -0.152160949662516078556178806805"
@@ -135,19 +20,16 @@ _DOP853_WEIGHTS = row_of(
 )
 
 #: Weights of the embedded solution of order 3, which uses stages 1, 9 and 12.
-_DOP853_THIRD_ORDER = row_of(
+_THIRD_ORDER = row_of(
     "0.244094488188976377952755905512 0 0 0 0 0 0 0 0.733846688281611857341361741547 0 0"
     " 0.0220588235294117647058823529412"
 )
 
-#: DOP853: the method of order 8 with twelve stages of Dormand and Prince as E. Hairer arranged it, with embedded
-#: solutions of orders 5 and 3 whose estimates are combined so that the error behaves like h**8, and a dense output of
-#: order 7 with three further stages.
-#:
-#: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, sections II.5, II.6
-#: and II.10, doi:10.1007/978-3-540-78862-1, and its code DOP853.
-DOP853 = ExplicitTableau(
+METHOD = ExplicitTableau(
     name="DOP853",
+    number=4,
+    order=8,
+    dense_order=7,
     nodes=row_of(
         "0 0.0526001519587677318785587544488 0.0789002279381515978178381316732"
         " 0.118350341907227396726757197510 0.281649658092772603273242802490"
@@ -182,7 +64,7 @@ DOP853 = ExplicitTableau(
         " -8.87285693353062954433549289258 12.3605671757943030647266201528"
         " 0.643392746015763530355970484046",
     ),
-    weights=_DOP853_WEIGHTS,
+    weights=_WEIGHTS,
     error_estimates=(
         ErrorEstimate(
             weights=row_of(
@@ -194,7 +76,7 @@ DOP853 = ExplicitTableau(
             order=5,
         ),
         ErrorEstimate(
-            weights=(*(b - b_hat for b, b_hat in zip(_DOP853_WEIGHTS, _DOP853_THIRD_ORDER, strict=True)), Fraction(0)),
+            weights=(*(b - b_hat for b, b_hat in zip(_WEIGHTS, _THIRD_ORDER, strict=True)), Fraction(0)),
             order=3,
             share=Fraction("0.01"),
         ),
@@ -241,4 +123,5 @@ DOP853 = ExplicitTableau(
         " -39.177261675615439165231486172 -149.72683625798562581422125276",
     ),
     source="Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I, 1993, section II.5, code DOP853",
+    stability=StabilityLimits(decay=6.3, undamped=5.9, damped=5.9, exponent=0.0, reach=6.1),
 )

@@ -1,1 +1,0 @@
-"""Tableaus of the integration methods."""
