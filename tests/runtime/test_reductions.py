@@ -15,7 +15,7 @@ from press_laws import LAWS, press
 
 from ballpass.runtime import Model, RequestError, SimulationError, Solution
 from ballpass.runtime.native.driver_library import PLAIN
-from ballpass.runtime.run.reductions import Reduction
+from ballpass.runtime.run.reductions import Reduction, Reductions, joined
 
 ModelMaker = Callable[..., Model]
 BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
@@ -169,6 +169,36 @@ def test_harmonic_motion_has_the_extremes_mean_and_rms_of_its_closed_form(make_m
         # at the top a relative error e of the value is an error of sqrt(e) of the phase
         assert phase - round(phase) == pytest.approx(0.0, abs=1e-3)
     assert found.maximum_ball is None
+
+
+@pytest.mark.parametrize("push", [1e-6, 1e-10, 1e-11])
+def test_a_small_vibration_about_a_large_offset_keeps_its_digits(make_model: ModelMaker, push: float) -> None:
+    """A ring 4 um from the middle that vibrates down to 3e-15 m; raw squares gave 9e-13 m."""
+    model = make_model("varying_compliance")
+    still = {"transient": 0, "parameters": {"shaft.speed": 0.0}}
+    start = model.simulate(duration=1e-3, times=[0.0], initial="equilibrium", **still).x[0].copy()
+    start[model.states.index("inner.vx")] = push
+    run = model.simulate(duration=0.02, times=np.linspace(0.0, 0.02, 20_001), rtol=1e-10, initial=start, **still)
+    x = run["inner.x"]
+    assert run.reductions is not None
+    found = run.reductions["inner.x"]
+    assert found.mean == pytest.approx(4e-6, rel=0.01)
+    assert found.std == pytest.approx(np.std(x - x[0]), rel=1e-4)
+
+
+def test_joined_stretches_keep_the_digits_of_their_deviation() -> None:
+    both = joined(stretch(mean=1.0, std=3e-9, duration=1.0), stretch(mean=1.0 + 8e-9, std=3e-9, duration=1.0))
+    assert both is not None
+    assert both["x"].std == pytest.approx(5e-9, rel=1e-6)
+    assert both["x"].mean == pytest.approx(1.0 + 4e-9, rel=1e-15)
+
+
+def stretch(*, mean: float, std: float, duration: float) -> Reductions:
+    extremes: dict[str, Any] = dict.fromkeys(("maximum", "maximum_time", "minimum", "minimum_time"), 0.0)
+    channel = Reduction(**extremes, maximum_ball=None, minimum_ball=None, mean=mean, std=std)
+    return Reductions(
+        channels={"x": channel}, start=0.0, duration=duration, end={}, steps=1, rejected=0, cycle_length=None
+    )
 
 
 def test_means_of_parts_of_a_run_add_up_to_that_of_the_whole(make_model: ModelMaker) -> None:

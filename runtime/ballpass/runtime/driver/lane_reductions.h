@@ -102,12 +102,10 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         BP_EACH_LANE {
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
             const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
-            const double sum = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2;
-            double q[5], low, high;
+            double q[5], low, high, sum, squares;
             bp_quartic(v0, v1, v2, v3, v4, q);
             bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
-            const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
-            const double squares = k < BP_NX ? bp_mean_square(q) : boole;
+            bp_moments(v0, v1, v2, v3, v4, q, b->shift[row + lane], k < BP_NX, &sum, &squares);
             b->integral[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * sum : 0.0;
             b->square[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * squares : 0.0;
             if (k >= BP_LOOKED_AT) continue;

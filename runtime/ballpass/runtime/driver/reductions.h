@@ -51,8 +51,9 @@ enum {
     BP_MIN = BP_MAX_BALL + BP_CHANNELS,
     BP_MIN_TIME = BP_MIN + BP_CHANNELS,
     BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
-    BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time */
-    BP_SQUARE = BP_INTEGRAL + BP_CHANNELS,   /* of its square */
+    BP_SHIFT = BP_MIN_BALL + BP_CHANNELS,  /* the channel where reductions start; 0 for powers of loads */
+    BP_INTEGRAL = BP_SHIFT + BP_CHANNELS,  /* of the channel less the shift, over time */
+    BP_SQUARE = BP_INTEGRAL + BP_CHANNELS, /* of the square of that */
     BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the third power over time [kN^3 s]: of each bearing outer, then inner raceway */
     BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
 };
@@ -257,6 +258,18 @@ static inline double bp_mean_square(const double *restrict q)
 {
     return q[0] * q[0] + 4.0 / 3.0 * (2.0 * q[0] * q[2] + q[1] * q[1]) + 16.0 / 5.0 * (2.0 * (q[0] * q[4] + q[1] * q[3]) + q[2] * q[2])
            + 64.0 / 7.0 * (2.0 * q[2] * q[4] + q[3] * q[3]) + 256.0 / 9.0 * (q[4] * q[4]);
+}
+
+/* Means over the step of a channel less a shift, and of the square of that: of a small vibration on a large offset raw squares have few digits.
+   `smooth`: that polynomial is the channel. */
+static inline void bp_moments(double v0, double v1, double v2, double v3, double v4, double *restrict q, double shift, int smooth,
+                              double *restrict mean, double *restrict square)
+{
+    *mean = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2 - shift;
+    q[0] -= shift;
+    const double exact = bp_mean_square(q), a = v0 - shift, b = v1 - shift, c = v2 - shift, d = v3 - shift, e = v4 - shift;
+    const double boole = bp_boole[0] * (a * a + e * e) + bp_boole[1] * (b * b + d * d) + bp_boole[2] * (c * c);
+    *square = smooth ? exact : boole;
 }
 
 /* Bounds of that polynomial between its ends: its inner Bezier ordinates (it lies within their hull and that of its end values). */
@@ -553,6 +566,7 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
 {
     const double h = step->h;
     const int first = !(reduction[BP_DURATION] > 0.0);
+    for (int k = 0; k < BP_LOOKED_AT && first; k++) reduction[BP_SHIFT + k] = v[0][k];
     double sum[BP_CHANNELS], square[BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
 #pragma omp simd
     for (int k = 0; k < BP_CHANNELS; k++) {
@@ -562,10 +576,7 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
         top[k] = high;
         bottom[k] = low;
-        sum[k] = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2;
-        const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
-        const double exact = bp_mean_square(q);
-        square[k] = k < BP_NX ? exact : boole;
+        bp_moments(v0, v1, v2, v3, v4, q, reduction[BP_SHIFT + k], k < BP_NX, &sum[k], &square[k]);
     }
     for (int k = 0; k < BP_CHANNELS; k++) {
         if (reduction[BP_WANTED + k] == 0.0) continue;

@@ -11,15 +11,19 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract import Manifest
 
-#: Head of a row, and what follows for every channel.
+Array: TypeAlias = NDArray[np.float64]
+
+#: Head of a row, and what follows for every channel; integrals are of the channel less its shift, and of the square
+#: of that.
 HEAD = ("from", "duration")
-ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
+ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", "shift", "integral", "square")
 
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
 BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
@@ -88,6 +92,19 @@ class ReductionRows:
         for name in self.channels:
             rows[:, self.column("wanted", name)] = name in channels
         return rows
+
+
+def moments_of(shift: Array, integral: Array, square: Array, duration: Array) -> tuple[Array, Array]:
+    """Mean and standard deviation over a time, from integrals about a shift; infinite where squares overflow."""
+    apart = integral / duration
+    with np.errstate(over="ignore", invalid="ignore"):
+        variance = square / duration - apart**2
+    return shift + apart, np.sqrt(np.where(variance >= 0.0, variance, np.where(np.isnan(variance), np.inf, 0.0)))
+
+
+def rms_of(mean: Array, std: Array) -> Array:
+    """Root mean square with the mean in it."""
+    return np.asarray(np.hypot(mean, std))
 
 
 def reduction_rows(manifest: Manifest) -> ReductionRows:

@@ -23,7 +23,9 @@ from ballpass.runtime.native.reduction_rows import (
     ROWS,
     SECTORS,
     ReductionRows,
+    moments_of,
     reduction_rows,
+    rms_of,
 )
 from ballpass.runtime.ratings.readings import LoadPowers
 from ballpass.runtime.show import html
@@ -40,7 +42,7 @@ class Reduction:
     maximum_time, minimum_time : when [s]
     maximum_ball, minimum_ball : the ball, counted from 1; None for a state
     mean : over time
-    rms : plain root mean square over time, with the mean in it
+    std : root mean square of the deviation from the mean
 
     Examples
     --------
@@ -56,12 +58,12 @@ class Reduction:
     minimum_time: float
     minimum_ball: int | None
     mean: float
-    rms: float
+    std: float
 
     @property
-    def std(self) -> float:
-        """Root mean square of the deviation from the mean."""
-        return math.sqrt(max(self.rms**2 - self.mean**2, 0.0))
+    def rms(self) -> float:
+        """Plain root mean square over time, with the mean in it."""
+        return float(rms_of(np.array(self.mean), np.array(self.std)))
 
     @property
     def range(self) -> float:
@@ -130,7 +132,12 @@ class Reductions(ShortRepr, Mapping[str, Reduction]):
     @staticmethod
     def from_facts(facts: Mapping[str, Any]) -> Reductions:
         """Reductions from what `dataclasses.asdict` gave of some."""
-        channels = {name: Reduction(**entry) for name, entry in facts["channels"].items()}
+        channels = {}
+        for name, entry in facts["channels"].items():
+            if "rms" in entry:  # of a file that holds it instead of the deviation
+                square = entry["rms"] ** 2 - entry["mean"] ** 2
+                entry = {key: value for key, value in entry.items() if key != "rms"} | {"std": max(square, 0.0) ** 0.5}
+            channels[name] = Reduction(**entry)
         return Reductions(**{**facts, "channels": channels})
 
 
@@ -188,6 +195,8 @@ def reduction_of(rows: ReductionRows, row: np.ndarray, channel: str, duration: f
     """What a row holds of a channel over its duration [s]."""
     entry = {kind: float(row[rows.column(kind, channel)]) for kind in ROWS}
     of_ball = channel in rows.balls
+    shift, integral, square = (np.array(entry[kind]) for kind in ("shift", "integral", "square"))
+    mean, std = map(float, moments_of(shift, integral, square, np.array(duration)))
     return Reduction(
         maximum=entry["max"],
         maximum_time=entry["max_time"],
@@ -195,8 +204,8 @@ def reduction_of(rows: ReductionRows, row: np.ndarray, channel: str, duration: f
         minimum=entry["min"],
         minimum_time=entry["min_time"],
         minimum_ball=int(entry["min_ball"]) if of_ball else None,
-        mean=entry["integral"] / duration,
-        rms=math.sqrt(entry["square"] / duration),
+        mean=mean,
+        std=std,
     )
 
 
@@ -217,6 +226,8 @@ def joined(first: Reductions | None, second: Reductions | None) -> Reductions | 
 
 
 def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> Reduction:
+    # Chan, Golub & LeVeque 1983: from deviations, not from raw squares
+    apart = second.mean - first.mean
     high = first if first.maximum > second.maximum else second
     low = first if first.minimum < second.minimum else second
     return replace(
@@ -224,8 +235,8 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
         minimum=low.minimum,
         minimum_time=low.minimum_time,
         minimum_ball=low.minimum_ball,
-        mean=share * first.mean + rest * second.mean,
-        rms=math.sqrt(share * first.rms**2 + rest * second.rms**2),
+        mean=first.mean + rest * apart,
+        std=math.sqrt(share * first.std**2 + rest * second.std**2 + share * rest * apart**2),
     )
 
 

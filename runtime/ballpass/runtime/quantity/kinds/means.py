@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ballpass.runtime.native.reduction_rows import moments_of, rms_of
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
 
 #: Units of integrals over time that have names.
@@ -38,11 +39,12 @@ def zero(view: View, note: str, moved: Array) -> Estimate:
 
 
 def _reduced_mean(runs: ReducedRuns, quantity: Quantity) -> Array:
-    return runs.entry("integral", quantity.channel) / runs.duration
+    return runs.entry("shift", quantity.channel) + runs.entry("integral", quantity.channel) / runs.duration
 
 
 def _reduced_rms(runs: ReducedRuns, quantity: Quantity) -> Array:
-    return np.sqrt(runs.entry("square", quantity.channel) / runs.duration)
+    shift, integral, square = (runs.entry(kind, quantity.channel) for kind in ("shift", "integral", "square"))
+    return rms_of(*moments_of(shift, integral, square, runs.duration))
 
 
 KINDS = (
@@ -52,7 +54,7 @@ KINDS = (
         summary="integral over time; of a power the work",
         unit_of=lambda unit: _OVER_TIME.get(unit, f"{unit}*s"),
         evaluate=_integral,
-        reduced=lambda runs, quantity: runs.entry("integral", quantity.channel),
+        reduced=lambda runs, quantity: _reduced_mean(runs, quantity) * runs.duration,
     ),
     Kind(name="rms", summary="root mean square over time, with the mean in it", evaluate=_rms, reduced=_reduced_rms),
 )
