@@ -31,8 +31,6 @@ ROUNDING: dict[str, tuple[str, dict[str, tuple[int, ...]]]] = {
     # Printed to 30 digits, the dense output to 29: up to 5e-27 each where a figure is above 100; 3e-26 is the
     # largest residual.
     "stepper-dop853": ("1e-25", {}),
-    # Printed to 16 digits, of figures up to 47; 2.2e-13 is the largest residual.
-    "stepper-tsit5": ("1e-12", {}),
     # Printed to 16 digits: up to 5e-15 each where a figure is above 10; 1.2e-14 is the largest residual.
     "stepper-rodas4": ("1e-13", {"algebraic_orders": (4, 3, 2)}),
     # Printed from double precision: up to 1.4e-14 each where a figure is above 128; 2.3e-13 is the largest
