@@ -19,7 +19,7 @@
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
-   extreme beside the jump: a contact that begins or ends between two quarters is located, and both of its sides are looked at.
+   extreme beside the jump.  A quarter of a step with a change of rank or contact is searched by halves, to 1e-6 of the extreme.
 
    A reduction is a row of BP_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef BALLPASS_REDUCTIONS_H
@@ -59,10 +59,8 @@ enum {
 };
 
 enum {
-    BP_REFINEMENTS = 40, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
-    BP_CELLS = 16,       /* parts of a step in which the slope of a channel may change its sign */
-    BP_TRIES = 48,       /* to locate a jump or a change of ranks in a quarter of a step */
-    BP_RANKS = 3         /* times that a change of ranks is cut into two */
+    BP_REFINEMENTS = 28, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
+    BP_CELLS = 16        /* parts of a step in which the slope of a channel may change its sign */
 };
 
 /* Of what few steps call: kept out of the code that all of them run. */
@@ -90,9 +88,6 @@ static inline int bp_powers_wanted(const double *reduction)
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
 static const double BP_BEYOND = 0.5;
-
-/* Parts of a step closer than this are one place. */
-static const double BP_HAIR = 1e-14;
 
 /* Parts that a step is taken in: more than a degree of four five points do not tell. */
 static inline int bp_parts(int dense_degree) { return dense_degree < BP_POINTS ? 1 : 2; }
@@ -322,28 +317,14 @@ static inline double bp_probe(const bp_search *search, double theta)
     return found;
 }
 
-/* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
-BP_SELDOM void bp_climb(const bp_search *search, const double *u, double theta, double promised)
+/* The top between a and c, of which b is the highest place known; b is one of them where the top may be beside it. */
+BP_SELDOM void bp_climb(const bp_search *search, double a, double va, double b, double vb, double c, double vc)
 {
-    const double found_there = bp_probe(search, theta);
-    /* the polynomial is the channel: there is its top */
-    if (fabs(found_there - promised) <= 1e-12 * (fabs(found_there) + fabs(promised))) return;
-    double place[BP_POINTS + 1], value[BP_POINTS + 1];
-    int highest = 0;
-    for (int i = 0, k = 0; k <= BP_POINTS; k++) {
-        const int here = i == k && (i == BP_POINTS || theta < 0.25 * i);
-        place[k] = here ? theta : 0.25 * i;
-        value[k] = here ? found_there : u[i];
-        if (!here) i++;
-        if (value[k] > value[highest]) highest = k;
-    }
-    if (highest == 0 || highest == BP_POINTS) return;
-    double a = place[highest - 1], b = place[highest], c = place[highest + 1];
-    double va = value[highest - 1], vb = value[highest], vc = value[highest + 1];
     for (int i = 0, settled = 0; i < BP_REFINEMENTS && settled < 2; i++) {
-        /* what the next parabola promises on top; beside a kink parabolas creep, or promise nothing by chance, and every other place is the
-           middle of the larger part instead */
-        const double range = va < vc ? vb - va : vb - vc, next = bp_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
+        /* what the next parabola promises on top; beside a kink or a jump parabolas creep, or promise nothing by chance, and every other
+           place is the middle of the larger part instead */
+        const double range = va < vc ? vb - va : vb - vc, next = bp_top(a, va, b, vb, c, vc);
+        const double move = next == b ? b == a || b == c : (next - b) / (next < b ? b - a : c - b);
         settled = range * move * move > 1e-9 * fabs(vb) ? 0 : settled + 1;
         const double at = i % 2 == 0 && next != b ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c), found = bp_probe(search, at);
         if (at < b) {
@@ -354,6 +335,32 @@ BP_SELDOM void bp_climb(const bp_search *search, const double *u, double theta, 
             else c = at, vc = found;
         }
     }
+}
+
+/* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
+BP_SELDOM void bp_climb_near(const bp_search *search, const double *u, double theta, double promised)
+{
+    const double found_there = bp_probe(search, theta);
+    /* the polynomial is the channel: there is its top */
+    if (fabs(found_there - promised) <= 1e-12 * (fabs(found_there) + fabs(promised))) return;
+    double place[BP_POINTS + 1], value[BP_POINTS + 1];
+    int k = 0;
+    for (int i = 0, j = 0; j <= BP_POINTS; j++) {
+        const int here = i == j && (i == BP_POINTS || theta < 0.25 * i);
+        place[j] = here ? theta : 0.25 * i;
+        value[j] = here ? found_there : u[i];
+        if (!here) i++;
+        if (value[j] > value[k]) k = j;
+    }
+    if (k > 0 && k < BP_POINTS) bp_climb(search, place[k - 1], value[k - 1], place[k], value[k], place[k + 1], value[k + 1]);
+}
+
+/* The top within the quarter of a step from i on, in which the channel has a kink or a jump. */
+static inline void bp_climb_quarter(const bp_search *search, const double *u, int i)
+{
+    const double a = 0.25 * i, c = 0.25 * (i + 1);
+    if (u[i] > u[i + 1]) bp_climb(search, a, u[i], a, u[i], c, u[i + 1]);
+    else bp_climb(search, a, u[i], c, u[i + 1], c, u[i + 1]);
 }
 
 /* Every top of what is searched for, whose values at the quarters are u, with the sign of a maximum.  The parabola is for where no polynomial
@@ -386,87 +393,9 @@ static inline void bp_tops(const bp_search *search, const double *u)
             s = moved < low ? low : moved > high ? high : moved;
         }
         const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
-        if (promised > search->sign * *search->best) bp_climb(search, u, 0.25 * (s + 2.0), promised);
+        if (promised > search->sign * *search->best) bp_climb_near(search, u, 0.25 * (s + 2.0), promised);
     }
-    if (search->channel >= BP_NX && above > search->sign * *search->best && place > 0.0 && place < 1.0) bp_climb(search, u, place, above);
-}
-
-/* Values of a channel for all balls at a place of a step. */
-static inline const double *bp_balls_at(const bp_within *step, double theta, int channel, double *restrict q, int *balls)
-{
-    double x[BP_NX];
-    const double t = step->state(step->source, theta, x);
-    bp_ball_quantities(step->n, t, x, q);
-    return bp_ball_row(q, channel - BP_NX, balls);
-}
-
-/* Where a function changes its sign within a step: two places and the values there.  By regula falsi (Illinois), every fourth time by
-   bisection; never closer to an end than a hair, so that the other side is met as well. */
-typedef struct {
-    double a, b, fa, fb;
-    int tries, kept;
-} bp_root;
-
-static inline int bp_is_open(const bp_root *root) { return root->tries < BP_TRIES && root->b - root->a > 3.0 * BP_HAIR; }
-
-static inline double bp_next_place(const bp_root *root)
-{
-    const double place = root->b - root->fb * (root->b - root->a) / (root->fb - root->fa);
-    if (root->tries % 4 == 3 || !(place >= root->a && place <= root->b)) return 0.5 * (root->a + root->b);
-    return place < root->a + BP_HAIR ? root->a + BP_HAIR : place > root->b - BP_HAIR ? root->b - BP_HAIR : place;
-}
-
-/* The function is f at a place between, which takes the place of a or b. */
-static inline void bp_narrow(bp_root *root, double place, double f, int of_a)
-{
-    root->tries++;
-    if (of_a) {
-        root->fb *= root->kept > 0 ? 0.5 : 1.0;
-        root->a = place, root->fa = f, root->kept = 1;
-    } else {
-        root->fa *= root->kept < 0 ? 0.5 : 1.0;
-        root->b = place, root->fb = f, root->kept = -1;
-    }
-}
-
-/* Both sides of the place where a ball's contact begins or ends; `channel` is its deflection, which is `start` and `end` at both ends. */
-BP_SELDOM void bp_jump(const bp_search *search, double from, double to, double start, double end, int channel, int ball)
-{
-    bp_root root = {from, to, start, end, 0, 0};
-    while (bp_is_open(&root)) {
-        const double place = bp_next_place(&root), deflection = bp_channel(search->step, place, channel, &ball);
-        bp_narrow(&root, place, deflection, (deflection > 0.0) == (start > 0.0));
-    }
-    bp_probe(search, root.a);
-    bp_probe(search, root.b);
-}
-
-/* Where the most loaded ball changes from one to another, and from and to those that are most loaded in between; `start` and `end` are the
-   values of all balls at both ends.  Given up where one ball stays above the extreme known while the other one rises. */
-BP_SELDOM void bp_rank_changes(const bp_search *search, double from, double to, const double *start, const double *end, int depth)
-{
-    int balls;
-    bp_ball_row(search->step->balls[0], search->channel - BP_NX, &balls);
-    const int first = bp_most_loaded(start, balls) - 1, last = bp_most_loaded(end, balls) - 1;
-    if (first == last) return;
-    bp_root root = {from, to, start[first] - start[last], end[first] - end[last], 0, 0};
-    double before = start[last], behind = end[first], q[BP_BALL_QUANTITIES];
-    const double *of = start;
-    while (bp_is_open(&root)) {
-        if (before >= *search->best || behind >= *search->best) return;
-        const double place = bp_next_place(&root);
-        of = bp_balls_at(search->step, place, search->channel, q, &balls);
-        const double f = of[first] - of[last], most = of[bp_most_loaded(of, balls) - 1];
-        if (most < *search->best) bp_probe(search, place);
-        bp_narrow(&root, place, f, f > 0.0);
-        if (f > 0.0) before = of[last];
-        else behind = of[first];
-        if (fabs(f) <= 1e-12 * fabs(most)) break;
-    }
-    const int most = bp_most_loaded(of, balls) - 1;
-    if (most == first || most == last || depth == 0) return;
-    bp_rank_changes(search, from, root.a, start, of, depth - 1);
-    bp_rank_changes(search, root.b, to, of, end, depth - 1);
+    if (search->channel >= BP_NX && above > search->sign * *search->best && place > 0.0 && place < 1.0) bp_climb_near(search, u, place, above);
 }
 
 /* Least that the most loaded ball carries within a step, from what all carry at its quarters; `least`: between two quarters each. */
@@ -490,11 +419,21 @@ static inline double bp_least(const double *const of[BP_POINTS], int balls, doub
     return whole;
 }
 
-/* The same for a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
+/* Whether the most loaded ball may carry less than `best` where it changes within a quarter of a step, from what all carry at both ends: chords
+   cross there, and a quarter of their rise is room for the curves. */
+static inline int bp_dips(const double *start, const double *end, int balls, double best)
+{
+    const int first = bp_most_loaded(start, balls) - 1, last = bp_most_loaded(end, balls) - 1;
+    if (first == last || start[last] >= best || end[first] >= best) return 0;
+    const double ahead = start[first] - start[last], behind = end[last] - end[first];
+    const double fall = end[first] - start[first], rise = end[last] - start[last];
+    return start[first] + fall * ahead / (ahead + behind) - 0.25 * (fabs(fall) + fabs(rise)) < best;
+}
+
+/* Extreme of a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
 static inline void bp_ball_extreme(bp_search search, const double *u)
 {
     const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS, deflection = BP_BALL_CHANNELS - 1;
-    const int touching = search.channel - kind + deflection;
     const double *of[BP_POINTS], *gap[BP_POINTS];
     int balls;
     for (int i = 0; i < BP_POINTS; i++) {
@@ -507,14 +446,11 @@ static inline void bp_ball_extreme(bp_search search, const double *u)
         double least[BP_POINTS - 1];
         if (!(bp_least(of, balls, least) < *search.best)) return;
         bp_tops(&search, u);
-        int most[BP_POINTS];
-        for (int i = 0; i < BP_POINTS; i++) most[i] = bp_most_loaded(of[i], balls);
         for (int i = 0; i + 1 < BP_POINTS; i++) {
-            const double from = 0.25 * i, to = 0.25 * (i + 1);
             if (!(least[i] < *search.best)) continue;
-            if (most[i] != most[i + 1]) bp_rank_changes(&search, from, to, of[i], of[i + 1], BP_RANKS);
-            for (int j = 0; j < balls && jumps; j++)
-                if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0)) bp_jump(&search, from, to, gap[i][j], gap[i + 1][j], touching, j + 1);
+            int kink = bp_dips(of[i], of[i + 1], balls, *search.best);
+            for (int j = 0; j < balls && jumps; j++) kink |= (gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0);
+            if (kink) bp_climb_quarter(&search, u, i);
         }
         return;
     }
@@ -528,8 +464,7 @@ static inline void bp_ball_extreme(bp_search search, const double *u)
         search.ball = j + 1;
         bp_tops(&search, own);
         for (int i = 0; i + 1 < BP_POINTS && jumps && high + BP_BEYOND * (high - low) > *search.best; i++)
-            if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0))
-                bp_jump(&search, 0.25 * i, 0.25 * (i + 1), gap[i][j], gap[i + 1][j], touching, j + 1);
+            if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0)) bp_climb_quarter(&search, own, i);
     }
 }
 
