@@ -78,6 +78,8 @@ class Multibody(Absolute):
         contact = bearing.contact
         if isinstance(contact, GivenContact):
             return self.value(contact.stiffness)
+        if bearing.element == "cylindrical-roller":  # of steel: both contacts approach alike (Palmgren, mm and N)
+            return (2 * 3.84e-8 * (1e3 * self.value(contact.length)) ** -0.8) ** (-10 / 9)
         materials = (contact.ring, contact.ball or contact.ring)
         compliance = sum((1 - self.value(m.poisson_ratio) ** 2) / self.value(m.young_modulus) for m in materials)
         ball, pitch = self.value(bearing.ball_diameter), self.value(bearing.pitch_diameter)
@@ -116,13 +118,13 @@ class Multibody(Absolute):
 
     def _force(self, bearing: Bearing, delta: float, rate: float) -> float:
         law, stiffness = bearing.damping.law, self.stiffnesses[bearing.name]
-        pressed = max(delta, 0.0)
-        elastic = stiffness * pressed**1.5
+        pressed, exponent = max(delta, 0.0), {"ball": 1.5, "cylindrical-roller": 10 / 9}[bearing.element]
+        elastic = stiffness * pressed**exponent
         numbers = {q.path.rpartition(".")[2]: self.value(q) for q in bearing.damping.numbers}
         if law == "none":
             return elastic
         if law == "tangent":
-            return elastic + numbers["ratio"] * 1.5 * stiffness * math.sqrt(pressed) * rate
+            return elastic + numbers["ratio"] * exponent * stiffness * pressed ** (exponent - 1) * rate
         if law == "hunt-crossley":
             return elastic * (1 + numbers["hysteresis"] * rate)
         viscous = numbers.get("coefficient", numbers.get("ratio", 0.0) * stiffness)

@@ -73,6 +73,7 @@ def driven_by(drive: str) -> tuple[tuple[str, str], ...]:
 CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "two-way press": ("punching_press_two_way", (), ()),
     "press, bearings in all hinges": ("punching_press_hinges", (), ()),
+    "press, roller on the crank pin": ("punching_press_roller", (), ()),
     "press, motor on the crank": ("punching_press_motor", (), ()),
     "toggle press": ("toggle_press", (), ()),
     "Andrews' squeezer": ("andrews", (), ()),
