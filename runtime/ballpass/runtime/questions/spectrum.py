@@ -12,7 +12,7 @@ import numpy as np
 from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.options import Duration, Option, Rtol, Transient
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -30,14 +30,6 @@ if TYPE_CHECKING:
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
-Cycles = Annotated[
-    float | None,
-    Option(
-        words="Turns of driver or shaft to simulate; as many as tell ball pass from the shaft if not given.",
-        shown="N",
-        above=0.0,
-    ),
-]
 SampleRate = Annotated[
     float | None,
     Option(
@@ -254,6 +246,8 @@ def spectrum(
     progress: Progress = None,
 ) -> SignalSpectrum:
     """The highest lines of a signal of the steady motion, and what each is: BPFO, BPFI, 2 BSF, FTF, the shaft.
+
+    Without a number of turns the run takes as many as tell ball pass from the shaft.
 
     Parameters
     ----------
