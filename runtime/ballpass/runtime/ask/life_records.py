@@ -60,7 +60,7 @@ class BearingStrength(ShortRepr):
         `peak_angle` of driver or shaft, None where its speed changes [rad]
     static_safety : s_0, of the load P_0 whose heaviest ball bears the peak force (Z/5 of it) [1]
     inner, outer : the rings
-    speed : of the inner ring against the outer one [rad/s]
+    speed : mean of the inner ring against the outer one in the run; 0 where there is no life [rad/s]
     why_no_life : reason why no standard gives a life; empty where one does
     equivalent_load : P, cubic mean of the force on the bearing [N]
     basic_life : L_10 of ISO 281 under P [turns]

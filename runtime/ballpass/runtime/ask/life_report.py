@@ -90,11 +90,11 @@ def _bearing(
     manifest, values = model.manifest, numbers.values
     ratings = ratings_of(info, values)
     initial = driver_angle.shaft_speed(manifest, values)
-    speed = math.copysign(history.speeds[info.prefix], values[info.ring_speed])
     peak = history.peaks[info.prefix]
     force = max(peak.maximum, 0.0)
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
     why = why_no_life(info, values, initial)
+    speed = 0.0 if why else math.copysign(history.speeds[info.prefix], values[info.ring_speed])
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
     load = samples.equivalent_load(float(ratings.life.basic))

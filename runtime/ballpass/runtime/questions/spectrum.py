@@ -249,6 +249,8 @@ def spectrum(
 
     Without a length the run has as many turns as tell the ball pass from the shaft's multiples.
 
+    Without a number of turns the run takes as many as tell ball pass from the shaft.
+
     Parameters
     ----------
     parameters : overrides, SI
