@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from stepper_methods import NAMES
 from typer.testing import CliRunner
+from virtual import virtual_model
 
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
@@ -241,3 +242,30 @@ def test_explain_says_of_each_bearing_what_is_not_modelled(
     assert "bearings.left.outer_ring" not in told
     for name in ("left", "right"):
         assert f"waviness of the outer raceway (bearings.{name}.outer_waviness)" in told
+
+
+def test_bearings_on_a_shaft_carry_their_shares_of_its_load(
+    scene_text: Callable[..., str], tmp_path: Path, make_virtual: Callable[..., Model]
+) -> None:
+    """Each rests where one alone does under that part; without shares each carries all, and that is said."""
+    alone, text = make_virtual("varying_compliance"), scene_text("varying_compliance")
+    start, end = text.index("[bearing]"), text.index("[run]")
+    for shares, words in (((0.25, 0.75), 0), ((0.25, 0.5), 0), ((None, None), 1)):
+        named = [
+            re.sub(r"^\[bearing(?=[.\]])", f"[bearings.{name}", text[start:end], flags=re.M).replace(
+                "balls = 8", "balls = 8" if share is None else f"balls = 8\nshare = {share}"
+            )
+            for name, share in zip("ab", shares, strict=True)
+        ]
+        outputs = ('"inner.*", "ball.*", "load.*"', '"a.*", "b.*"')
+        folder = tmp_path / f"pair_{len(list(tmp_path.iterdir()))}"
+        whole = (text[:start] + "".join(named) + text[end:]).replace(*outputs)
+        model = virtual_model(whole, folder)
+        found = model.static_equilibrium().x
+        for k, share in enumerate(shares):
+            load = 196.0 * (1.0 if share is None else share)
+            expected = alone.static_equilibrium(parameters={"load.force.x": load}).x[0]
+            assert found[2 * k] == pytest.approx(expected, rel=1e-9)
+        assert sum("carries the whole load of the shaft" in limit for limit in model.explain().limits) == words
+        unusual = " ".join(model.explain().unusual)
+        assert ("whole load together" in unusual) == (shares == (0.25, 0.5))

@@ -26,11 +26,13 @@ def usual_ranges(scene: Scene) -> tuple[UsualInfo, ...]:
             found += _declared(quantities_of(force), known)
             found += force.law.usual(scene.mechanism.driver)
     found += _declared(quantities_of(scene.bearings), known)
-    at_joint = sorted((b for b in scene.bearings if b.joint is not None), key=lambda bearing: bearing.joint or "")
+    at_joint = sorted(scene.bearings, key=lambda bearing: bearing.joint or "")
     for joint, group in groupby(at_joint, key=lambda bearing: bearing.joint):
         shares = [bearing.share.path for bearing in group if bearing.share is not None]
         if len(shares) > 1:
-            hint = f"The bearings at joint {joint} carry its whole reaction together."
+            hint = "The bearings carry the shaft's whole load together."
+            if joint is not None:
+                hint = f"The bearings at joint {joint} carry its whole reaction together."
             found.append(UsualInfo(names=tuple(shares), least=_SHARES[0], most=_SHARES[1], hint=hint))
     return tuple(found)
 

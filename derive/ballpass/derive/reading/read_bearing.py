@@ -111,12 +111,12 @@ def _read_place(
 ) -> tuple[str | None, SceneNumber | None]:
     if mechanism is None:
         table.refuse(
-            ("joint", "share"),
+            ("joint",),
             "there is no mechanism to load the bearing",
-            allowed="joint and share only in a scene with [mechanism]",
+            allowed="joint only in a scene with [mechanism]",
             remedy="delete the key, or describe the mechanism",
         )
-        return None, None
+        return None, keys_of(Bearing)["share"].read(table, "share") if table.has("share") else None
     share = None
     if coupling == "one-way":
         share = keys_of(Bearing)["share"].read(table, "share")

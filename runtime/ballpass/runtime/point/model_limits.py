@@ -21,7 +21,15 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float], scene: str 
     scene : what the command line calls it
     """
     mechanism = manifest.mechanism
-    if mechanism is None or not manifest.bearings:
+    if mechanism is None:
+        whole = [bearing.path for bearing in manifest.bearings if f"{bearing.path}.share" not in values]
+        if len(manifest.bearings) > 1 and whole:
+            yield (
+                f"{', '.join(whole)}: each carries the whole load of the shaft, as no other bearing does. Give each "
+                "bearing its part, as share = 0.5."
+            )
+        return
+    if not manifest.bearings:
         return
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
     for bearing in manifest.bearings:
