@@ -120,19 +120,19 @@ def test_a_link_carries_values_and_a_fault_stands_in_the_words_of_the_solver(
 @needs_compiler
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("scene", "bearing"),
+    ("scene", "bearing", "share"),
     [
-        ("rotor", ""),
-        ("punching_press_motor", ""),
-        ("punching_press_hinges", "pin."),
-        *(
-            pytest.param(scene, bearing, marks=pytest.mark.extreme)
-            for scene, bearing in (("four_bar", ""), ("punching_press_two_way", ""), ("toggle_press", "knee."))
-        ),
+        ("rotor", "", 1e-5),
+        ("punching_press_motor", "", 1e-5),
+        ("punching_press_hinges", "pin.", 1e-5),
+        pytest.param("four_bar", "", 1e-5, marks=pytest.mark.extreme),
+        pytest.param("punching_press_two_way", "", 1e-5, marks=pytest.mark.extreme),
+        # its unloaded joints rattle behind the work, where the last bit of another libm grows
+        pytest.param("toggle_press", "knee.", 5e-3, marks=pytest.mark.extreme),
     ],
 )
 def test_pages_of_other_machines_give_native_peaks_and_positions(
-    make_model: Callable[..., Model], browser: Page, tmp_path: Path, scene: str, bearing: str
+    make_model: Callable[..., Model], browser: Page, tmp_path: Path, scene: str, bearing: str, share: float
 ) -> None:
     model = make_model(scene)
     browser.open(model.explore(tmp_path / "page.html"))
@@ -140,12 +140,13 @@ def test_pages_of_other_machines_give_native_peaks_and_positions(
     solution = model.simulate()
     peak = model.refine_peak(solution.steady(), f"{bearing}ball.force").value
     assert found[f"{bearing}peak_ball_force"] == pytest.approx(peak, rel=1e-6)
-    # positions, forces and angles as the page brings them of the native run, before its own solver has run
+    # positions, forces and angles are those that the page brings of the native run, of five digits
     own = browser.value("({ brought: numbers, solved: data })")
     for path in _signals(own["brought"]):
-        native, solved = (_at(own[kind], path) for kind in ("brought", "solved"))
-        most = np.max(np.abs(native))
-        assert np.ptp(native) == pytest.approx(np.ptp(solved), abs=2e-3 * most + 1e-9), path
+        (native, digits), (solved, _) = (_at(own[kind], path) for kind in ("brought", "solved"))
+        assert native.shape == solved.shape
+        # half of the last digit that the page brings, and another libm
+        assert np.max(np.abs(native - solved)) <= 0.501 * 10.0**-digits + share * np.max(np.abs(native)), path
     assert not browser.complaints
 
 
@@ -162,10 +163,11 @@ def _signals(numbers: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ..
             yield from _signals(value, (*path, k))
 
 
-def _at(numbers: Any, path: tuple[Any, ...]) -> np.ndarray:
+def _at(numbers: Any, path: tuple[Any, ...]) -> tuple[np.ndarray, int]:
+    """Values of a signal, and its decimals."""
     for key in path:
         numbers = numbers[key]
-    return np.array(numbers["values"]) / 10.0 ** numbers["decimals"]
+    return np.array(numbers["values"]) / 10.0 ** numbers["decimals"], numbers["decimals"]
 
 
 def test_page_needs_nothing_but_itself(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
