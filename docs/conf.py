@@ -5,7 +5,12 @@ from __future__ import annotations
 import re
 from importlib.metadata import distribution
 from importlib.metadata import version as installed_version
+from pathlib import Path
 from typing import Any
+
+from ballpass.derive import generate, shipped_scenes
+from ballpass.runtime import load
+from ballpass.runtime.app.commands.explore import scene_units
 
 project = "ballpass"
 author = "the ballpass authors"
@@ -90,6 +95,18 @@ def describe_entries(app: Any, what: str, name: str, obj: Any, options: Any, lin
     lines[:] = rewritten
 
 
+def write_live_pages(app: Any) -> None:
+    """A page with the solver in it for each scene that comes with ballpass, beside the others of the site."""
+    if app.builder.format != "html":
+        return
+    folder = Path(app.outdir) / "live"
+    folder.mkdir(parents=True, exist_ok=True)
+    for scene in shipped_scenes().values():
+        model = load(generate(scene))
+        model.explore(folder / f"{scene.stem}.html", units=scene_units(scene, model.manifest))
+
+
 def setup(app: Any) -> None:
+    app.connect("builder-inited", write_live_pages)
     # before napoleon, which listens with the default priority of 500
     app.connect("autodoc-process-docstring", describe_entries, priority=400)

@@ -13,10 +13,12 @@ import tempfile
 from pathlib import Path
 from subprocess import run
 
+from PIL import Image
+
 from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.app.figure_run import run_for_figures
-from ballpass.runtime.plot.gallery import draw_all
+from ballpass.runtime.plot.gallery import draw, draw_all
 from ballpass.runtime.plot.style import write_figures
 from ballpass.runtime.questions.life import life_figures
 
@@ -85,8 +87,25 @@ def draw_movie() -> None:
         shutil.copyfile(Path(folder) / "animation.gif", IMAGES / "four_bar.gif")
 
 
+#: Pixels an inch and colours of the small pictures of all machines.
+SMALL, COLOURS = 72, 48
+
+
+def draw_machines() -> None:
+    """Each shipped scene at its highest ball force, small, as ``docs/images/machine_<scene>.png``."""
+    for path in sorted((ROOT / "scenes").glob("*.toml")):
+        model = load(generate(path, ROOT / "generated" / path.stem))
+        target = IMAGES / f"machine_{path.stem}.png"
+        with tempfile.TemporaryDirectory() as folder:
+            drawn = Path(folder) / "machine.png"
+            draw("peak_moment", model, model.simulate()).savefig(drawn, dpi=SMALL)
+            Image.open(drawn).convert("RGB").quantize(COLOURS).save(target, optimize=True)
+        print(target.relative_to(ROOT))
+
+
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
+    draw_machines()
     draw_movie()
     draw_lives()
     for scene, names in PICTURES.items():

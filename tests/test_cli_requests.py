@@ -122,6 +122,21 @@ def test_animations_that_cannot_be_end_with_exit_code_2(
     assert not list(site.glob("moving/*"))
 
 
+def test_out_names_the_file_and_its_kind(site: Path, ballpass: Callable[..., Result]) -> None:
+    """A GIF begins with its name; a folder that is called like one stays a folder."""
+    words = ("--cycles", "1", "--transient", "0", "--pictures", "2")
+    done = ballpass("animate", SCENE, *words, "--out", "films/x.gif")
+    assert done.exit_code == 0, done.output
+    assert (site / "films" / "x.gif").read_bytes().startswith(b"GIF8")
+    assert [path.name for path in (site / "films").iterdir()] == ["x.gif"]
+    done = ballpass("animate", SCENE, *words, "--format", "mp4", "--out", "films/x.gif")
+    assert done.exit_code == 2, done.output
+    assert "name two kinds of files" in done.stderr
+    (site / "folder.gif").mkdir()
+    done = ballpass("animate", SCENE, *words, "--format", "gif", "--out", "folder.gif")
+    assert done.stdout.startswith("folder.gif/animation.gif (")
+
+
 def test_animate_writes_the_page_of_the_last_turns(site: Path, ballpass: Callable[..., Result]) -> None:
     done = ballpass("animate", SCENE, "--cycles", "4", "--transient", "1", "--last", "2", "--out", "moving")
     assert done.exit_code == 0, done.output

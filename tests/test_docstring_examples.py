@@ -7,6 +7,7 @@ They see the press of the paper as `model`, its generated folder and results whe
 from __future__ import annotations
 
 import doctest
+import importlib.util
 import inspect
 import re
 from collections.abc import Callable, Iterator
@@ -53,6 +54,13 @@ INTERNAL = {
     "Reductions.from_facts",
     "Reductions.table_html",
     "SolutionPlot.__call__",
+}
+#: Examples that take long, or need what not every installation has: ziglang compiles for a page, the first time a minute.
+MARKS = {
+    "Model.explore": (
+        pytest.mark.long,
+        pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed"),
+    )
 }
 #: Code of a page at 1280 pixels, and what is code.
 COLUMNS, EXAMPLE = 90, re.compile(r" *(>>>|\.\.\.) ")
@@ -101,7 +109,9 @@ def run(names: dict[str, Any]) -> Iterator[Callable[[str, Any], None]]:
     plt.close("all")
 
 
-@pytest.mark.parametrize(("name", "found"), [pytest.param(*item, id=item[0]) for item in documented()])
+@pytest.mark.parametrize(
+    ("name", "found"), [pytest.param(*item, id=item[0], marks=MARKS.get(item[0], ())) for item in documented()]
+)
 def test_public_names_have_examples_that_run(run: Callable[[str, Any], None], name: str, found: Any) -> None:
     run(name, found)
 

@@ -644,6 +644,11 @@ class Model(PointModel, Questions):
             The compiler is missing; the model has no states, or nothing that can be drawn.
         SimulationError, CompileError
             The run of the scene's own numbers, or the compiler, failed.
+
+        Examples
+        --------
+        >>> model.explore("explore.html", units={"bearing.clearance": "um"}).name
+        'explore.html'
         """
         from ballpass.runtime.export.web_assembly import check_compiler
         from ballpass.runtime.plot.explore import write_exploration

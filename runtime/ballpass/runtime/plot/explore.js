@@ -272,6 +272,7 @@ get("csv").addEventListener("click", () => {
 });
 
 async function openPage() {
+  document.body.classList.toggle("framed", self !== top); // the page around it has a title
   listRows();
   try {
     await loadSolver();

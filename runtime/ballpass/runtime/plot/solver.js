@@ -45,19 +45,24 @@ async function solve(values, stale) {
   let first = 0, began = performance.now();
   while (time(first) < least) first += 1;
   const rows = new Float64Array((count - first + 1) * width), jumps = [];
-  let next = -1;
+  const apart = 1e-10 * whole; // closer than this a sample and a switch are one time
+  let next = -1, reached = 0;
   for (let k = 0; k <= count; k += 1) {
     if (k > first) { // both sides of every time at which a load switches, for means and peaks
-      if (next < time(k - 1)) next = machine.ballpass_next_switch(machine.one);
-      while (next < time(k)) {
-        for (const side of [Math.max(next - 1e-10 * whole, time(k - 1)), next]) {
-          must(machine.ballpass_run_to(machine.one, side));
+      if (next < reached) next = machine.ballpass_next_switch(machine.one);
+      while (next < time(k) + apart) {
+        for (const side of [next - apart, next]) {
+          reached = Math.max(side, reached);
+          must(machine.ballpass_run_to(machine.one, reached));
           jumps.push([k - first, readRow().slice()]);
         }
         next = machine.ballpass_next_switch(machine.one);
       }
     }
-    if (k >= first || k % 32 === 0) must(machine.ballpass_run_to(machine.one, time(k)));
+    if (k >= first || k % 32 === 0) {
+      reached = Math.max(time(k), reached);
+      must(machine.ballpass_run_to(machine.one, reached));
+    }
     if (k === first) machine.ballpass_save(machine.one, machine.saved);
     if (k >= first) rows.set(readRow(), (k - first) * width);
     if (k % 32 === 0 && performance.now() - began > 40) { // the page stays alive
@@ -167,7 +172,7 @@ function drawnOf(run) {
     let best = [-Infinity, begins];
     for (let k = begins; k < run.count; k += 1) best = bearing.force.reduce((most, column) => (row(k)[column] > most[0] ? [row(k)[column], k] : most), best);
     return best;
-  }), stride = Math.ceil((run.count - begins) / 1000), chosen = [];
+  }), stride = Math.ceil((run.count - begins - 1) / 1000), chosen = [];
   for (let k = begins; k < run.count; k += 1) if ((k - begins) % stride === 0 || k === run.count - 1 || tops.some((top) => top[1] === k)) chosen.push(k);
   const peak = tops.length ? tops.reduce((best, top) => (top[0] > best[0] ? top : best))[1] : begins;
   const rows = chosen.map(row), shift = 360 * Math.floor(Math.min(...chosen.map((k) => angles[k])) / TURN + 1e-9);

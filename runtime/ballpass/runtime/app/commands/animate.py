@@ -11,7 +11,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
+from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.plot import MOVING
@@ -41,7 +41,7 @@ def animate(
     duration: Duration = None,
     transient: Transient = None,
     rtol: Rtol = None,
-    out: options.ResultsFolder = None,
+    out: options.ResultsFile = None,
 ) -> None:
     """Simulate a scene and write its last turn as a moving picture: linkage, bearings, forces and signals.
 
@@ -50,6 +50,10 @@ def animate(
     """
     with command(scene) as stages:
         stages("read")
+        kind = "" if out is None or out.is_dir() else out.suffix.removeprefix(".")
+        if kind in MOVING and format_ not in ("html", kind):
+            raise RequestError(f"--format {format_} and --out {out} name two kinds of files. Omit --format.")
+        format_ = kind if kind in MOVING else format_
         if pictures is not None and format_ == "html":
             raise RequestError("--pictures is of movies; a page has up to 1000 positions. Omit it, or --format gif.")
         if format_ != "html":
@@ -57,8 +61,7 @@ def animate(
 
             count_pictures(f".{format_}", last, pictures)  # impossible requests: refused before the simulation
         asked = read_asked(scene, set_, duration, transient)
-        folder = results_folder(out, scene)
-        path = folder / f"animation.{format_}"
+        path = results_file(out, scene, f"animation.{format_}", MOVING)
         model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
         if bearing is not None:
             from ballpass.runtime.plot.record import bearing_named
@@ -76,6 +79,6 @@ def animate(
         stages("draw")
         from ballpass.runtime.plot.animate import write_animation
 
-        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_animation(model, solution, path, turns=last, bearing=bearing, pictures=pictures, progress=stages.fraction)
     show(f"{path} ({size_words(path.stat().st_size)})")

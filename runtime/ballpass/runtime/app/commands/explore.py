@@ -12,7 +12,7 @@ from typing import Any
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
+from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
@@ -23,7 +23,7 @@ _QUANTITY = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?\s*(.+?)\s*")
 _COMPONENTS = {"x": 0, "y": 1}
 
 
-def explore(scene: options.SceneOrFolder, out: options.ResultsFolder = None) -> None:
+def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> None:
     """Write a scene as a page with the solver in it: move a number, and curves and peaks follow.
 
     The page is one file. It needs no server, no network and no installation where it is opened. Its address carries the
@@ -35,7 +35,7 @@ def explore(scene: options.SceneOrFolder, out: options.ResultsFolder = None) -> 
         stages("read")
         check_compiler()
         asked = read_asked(scene, None)
-        path = results_folder(out, scene) / "explore.html"
+        path = results_file(out, scene, "explore.html", ("html",))
         model = load_model(scene, stages, asked.run.method, overrides={})
         stages("compile for pages")
         path.parent.mkdir(parents=True, exist_ok=True)

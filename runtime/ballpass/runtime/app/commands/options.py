@@ -44,6 +44,12 @@ ResultsFolder = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the results; `results/<scene>` if not given.")
 ]
 
+#: Of commands that write one file.
+ResultsFile = Annotated[
+    Path | None,
+    typer.Option(metavar="PATH", help="File to write, or its folder; `results/<scene>` if not given."),
+]
+
 ReportFolder = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder for report and figures; none are written if not given.")
 ]

@@ -13,7 +13,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -230,6 +230,14 @@ def results_folder(out: Path | None, scene: Path) -> Path:
     folder = out if out is not None else Path("results") / name_of(scene)
     check_folder(folder)
     return folder
+
+
+def results_file(out: Path | None, scene: Path, name: str, kinds: Sequence[str]) -> Path:
+    """The file that ``--out`` names by its ending, one of `kinds`; else `name` in the folder that it names."""
+    if out is not None and out.suffix.removeprefix(".") in kinds and not out.is_dir():
+        check_folder(out.parent)
+        return out
+    return results_folder(out, scene) / name
 
 
 def check_folder(folder: Path) -> None:
