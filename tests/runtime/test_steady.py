@@ -95,7 +95,8 @@ def test_the_doubling_is_where_an_independent_solver_has_it_and_its_branch_is_fo
     assert all(point.stable for point in twice.points)
     assert "meets the branch" in twice.ended
     text = str(found)
-    assert "1961.146" in text and "period doubling" in text
+    assert "1961.146" in text
+    assert "period doubling" in text
 
 
 def test_a_fold_is_where_runs_leave_the_branch(rotor: Model) -> None:
