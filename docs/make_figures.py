@@ -1,8 +1,8 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
 Every picture is a figure of ``ballpass run SCENE`` or ``ballpass life SCENE``, copied to
-``docs/images/<scene>_<figure>.png``, but those of `SPECTRA` and `ANSWERS`, which are of commands as the how-to calls
-them.
+``docs/images/<scene>_<figure>.png``, but those of `SPECTRA` and `ANSWERS`, which are
+of commands as the how-to calls them.
 """
 
 from __future__ import annotations
@@ -53,6 +53,13 @@ ANSWERS = {
     "steady_branches": (
         ("steady", "varying_compliance.toml", "--over", "shaft.speed=1940 rpm:1990 rpm"),
         "branches",
+    ),
+    "bifurcation_press": (
+        (
+            *("bifurcation", "punching_press_tangent.toml", "--set", "bearing.pitch_diameter=31.75 mm"),
+            *("--vary", "bearing.clearance=5 um:45 um:61", "--readings", "40", "--settling", "20"),
+        ),
+        "bifurcation",
     ),
 }
 

@@ -52,6 +52,13 @@ TABLES = {
 #: reason is the name of a file, the file holds the numbers; where it begins with "=", it computes them from others of
 #: the page.
 NAMED: dict[str, dict[str, str]] = {
+    "docs/howto/bifurcation.md": {
+        "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",
+        "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of ask/lyapunov.py",
+        "repeat after n, up to 16.": "`LONGEST` of ask/lyapunov.py",
+        "ratio 409/1072) repeats after 134 turns only": "(1 - 7.9375/33.5)/2; test_steady.py",
+        "as in Fig. 7 of the paper": "the paper's figure",
+    },
     "docs/howto/steady.md": {
         "cage ratio of 409/1072, and repeats after 134 turns": "(1 - 7.9375/33.5)/2; test_steady.py",
         "All are smaller than 1 here": "the definition of stability",

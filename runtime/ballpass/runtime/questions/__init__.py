@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from ballpass.runtime.questions.bifurcation import bifurcation
 from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
@@ -17,6 +18,7 @@ from ballpass.runtime.questions.steady import steady
 class Questions:
     """Questions about a model, as its methods; the command line lists the same."""
 
+    bifurcation = bifurcation
     checked_jacobian = checked_jacobian
     life = life
     linearize = linearize

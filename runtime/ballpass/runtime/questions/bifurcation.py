@@ -1,0 +1,321 @@
+"""What kind of motion there is over a parameter: stroboscopic values up and down, and the largest Lyapunov exponent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Option, Rtol
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.lyapunov import Exponent
+    from ballpass.runtime.ask.parameter_range import ParameterRange
+
+#: Longest period of the equations that is taken between readings, in turns; else it is one turn.
+LONGEST_STROBE = 8.0
+
+#: Tolerance where none is given [1].
+DEFAULT_RTOL = 1e-7
+
+#: Both directions agree where their readings' means do, in shares of the magnitudes [1].
+SAME = 1e-2
+
+#: Moments at which the equations are compared.
+MOMENTS = 40
+
+Vary = Annotated[
+    str,
+    Option(words="Parameter and its values.", shown="PATH=A:B:N", example='bearing.clearance="5 um:40 um:80"'),
+]
+State = Annotated[
+    str | None, Option(words="State that is shown; the inner ring along y if none is given.", shown="STATE")
+]
+Readings = Annotated[
+    int, Option(words="Stroboscopic readings that are kept at each value.", shown="N", least=20, most=100_000)
+]
+Settling = Annotated[int, Option(words="Readings at each value that do not count.", shown="N", least=0, most=1_000_000)]
+WithExponent = Annotated[
+    bool,
+    Option(words="Compute the largest Lyapunov exponent.", flags=("--exponent/--no-exponent",)),
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionAt:
+    """The motion at one value.
+
+    Attributes
+    ----------
+    value : of the parameter, SI
+    states : readings, shape (readings, states)
+    exponent : largest Lyapunov exponent per reading; None where none was asked for
+    kind : ``periodic n``, ``quasi-periodic``, ``chaotic`` or ``undecided``
+    """
+
+    value: float
+    states: np.ndarray
+    exponent: Exponent | None
+    kind: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Bifurcation(ShortRepr, Reported):
+    """Motions over a parameter, each begun where the one at the value before ended.
+
+    Attributes
+    ----------
+    vary : the parameter and its range
+    state, unit : that is shown
+    row : of that state
+    every : time between readings, in words
+    up, down : motions in the order of the values, from the first end on and from the second end on
+    apart : values at which the two directions differ: several motions exist, or one has not settled
+
+    Examples
+    --------
+    >>> pitch = {"bearing.pitch_diameter": 31.75e-3}  # cage ratio 3/8: a turn is a period
+    >>> found = model.bifurcation("bearing.clearance=5 um:10 um:2", parameters=pitch, readings=20, exponent=False)
+    >>> [motion.kind for motion in found.up]
+    ['periodic 1', 'periodic 1']
+    """
+
+    vary: ParameterRange
+    state: str
+    unit: str
+    row: int
+    every: str
+    up: tuple[MotionAt, ...]
+    down: tuple[MotionAt, ...]
+    apart: tuple[float, ...]
+
+    def _report(self) -> Report:
+        unit, factor = self.vary.shown_unit, self.vary.factor
+        rows = []
+        for name, motions in (("up", self.up), ("down", self.down)):
+            for kind, group in groupby(motions, key=lambda motion: motion.kind):
+                members = list(group)
+                ends = f"{members[0].value / factor:.6g} to {members[-1].value / factor:.6g}"
+                ends = ends if len(members) > 1 else f"{members[0].value / factor:.6g}"
+                rows.append((name, ends, kind, _span([m.exponent for m in members if m.exponent is not None])))
+        table = ReportTable(
+            title=f"Motion over {self.vary.name}, read {self.every}",
+            heads=("direction", f"values, {unit}", "motion", "largest exponent per reading"),
+            rows=rows,
+        )
+        said = []
+        if self.apart:
+            found = ", ".join(f"{value / factor:.6g}" for value in self.apart[:8])
+            more = f" and {len(self.apart) - 8} more" if len(self.apart) > 8 else ""
+            said.append(f"Up and down differ at {found}{more} {unit}: several motions, or one not settled.")
+        said.append("Regions hold at the values themselves, whose distance limits where one ends.")
+        records = [
+            {
+                "direction": name,
+                "value": motion.value,
+                "kind": motion.kind,
+                "exponent": motion.exponent.mean if motion.exponent else None,
+                "exponent_half": motion.exponent.half if motion.exponent else None,
+                "readings": motion.states[:, self.row].tolist(),
+            }
+            for name, motions in (("up", self.up), ("down", self.down))
+            for motion in motions
+        ]
+        facts = {
+            "vary": self.vary.name,
+            "vary_unit": self.vary.unit,
+            "state": self.state,
+            "unit": self.unit,
+            "every": self.every,
+            "apart": list(self.apart),
+            "motions": records,
+        }
+        return Report(parts=(table, *said), facts=facts, records=records, index=("direction", "value"))
+
+
+def _span(exponents: list[Exponent]) -> str:
+    if not exponents:
+        return ""
+    if len(exponents) == 1:
+        return f"{exponents[0].mean:.3g} ± {exponents[0].half:.2g}"
+    means = [one.mean for one in exponents]
+    return f"{min(means):.3g} to {max(means):.3g}, ± {max(one.half for one in exponents):.2g} at most"
+
+
+def _figures(_model: AnyModel, found: Bifurcation, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.bifurcation import draw_bifurcation
+
+    yield "bifurcation", draw_bifurcation(found.vary, found.state, found.unit, found.row, found.up, found.down)
+
+
+def _check(_values: Mapping[str, object]) -> None:
+    need("scipy")
+
+
+@Question(stage="simulate", figures=_figures, check=_check)
+def bifurcation(
+    model: AnyModel,
+    vary: Vary,
+    of: State = None,
+    *,
+    readings: Readings = 60,
+    settling: Settling = 40,
+    exponent: WithExponent = True,
+    parameters: Mapping[str, float] | None = None,
+    rtol: Rtol = None,
+    progress: Progress = None,
+) -> Bifurcation:
+    """Tell periodic from chaotic motion over a parameter, upwards and downwards.
+
+    Each value begins where the motion at the value before ended, so that motions that exist side by side show as a
+    difference between up and down. States are read once in a period of the equations, or once a turn where that is
+    longer than eight turns.
+
+    Parameters
+    ----------
+    parameters : overrides, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        A wrong range or state, a scene in which nothing turns, one whose driver's motion is a state, or with
+        `exponent` a law whose force jumps.
+    IntegrationError
+        The computation failed.
+
+    Examples
+    --------
+    >>> pitch = {"bearing.pitch_diameter": 31.75e-3}  # cage ratio 3/8: a turn is a period
+    >>> found = model.bifurcation("bearing.clearance=5 um:10 um:2", parameters=pitch, readings=20)
+    >>> [motion.exponent.high < 0.0 for motion in found.up]
+    [True, True]
+    """
+    from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.run.locating import refuse_jumps
+
+    manifest = model.manifest
+    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
+        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
+        raise RequestError(f"bifurcation: {why} in this scene. Allowed: bearings, and a driver at constant speed.")
+    if exponent:
+        refuse_jumps(manifest, "bifurcation with an exponent")
+    chosen = parameter_range(manifest, "vary", vary, counted=True)
+    names = [info.name for info in manifest.states]
+    state = of or ("inner.y" if "inner.y" in names else names[0])
+    if state not in names:
+        raise RequestError(unknown_name("state", state, names))
+    values = np.linspace(chosen.low, chosen.high, chosen.count)
+    overrides = dict(parameters or {})
+    step_of, every, forced = _strobe(model, {**overrides, chosen.name: chosen.low})
+    tolerance = DEFAULT_RTOL if rtol is None else rtol
+    with shown("following motions", progress) as tell:
+        done = [0]
+
+        def sweep(order: np.ndarray) -> tuple[MotionAt, ...]:
+            found, start = [], None
+            for value in order.tolist():
+                given = {**overrides, chosen.name: value}
+                motion = _motion(model, given, value, step_of, start, readings, settling, tolerance, exponent, forced)
+                found.append(motion)
+                start = motion.states[-1]
+                done[0] += 1
+                if tell is not None:
+                    tell(done[0] / (2 * len(values)))
+            return tuple(found)
+
+        with ThreadPoolExecutor(2) as pool:
+            up, down = pool.map(sweep, (values, values[::-1]))
+    scale = np.max(np.abs(np.concatenate([motion.states for motion in up])), axis=0) + 1e-300
+    apart = tuple(
+        one.value
+        for one, other in zip(up, down[::-1], strict=True)
+        if (one.kind != other.kind and "undecided" not in (one.kind, other.kind))
+        or (one.kind != "chaotic" and np.max(np.abs(one.states.mean(0) - other.states.mean(0)) / scale) > SAME)
+    )
+    return Bifurcation(
+        vary=chosen,
+        state=state,
+        unit=manifest.states[names.index(state)].unit,
+        row=names.index(state),
+        every=every,
+        up=up,
+        down=down,
+        apart=apart,
+    )
+
+
+def _strobe(
+    model: AnyModel, parameters: Mapping[str, float]
+) -> tuple[Callable[[Mapping[str, float]], float], str, bool]:
+    """Time between readings as a function of overrides, words for it, and whether it is a period of the equations."""
+    from ballpass.runtime.ask.forcing_period import forcing_period
+
+    turn = model.period(parameters)
+    if not math.isfinite(turn):
+        raise RequestError("bifurcation: nothing turns in this scene. Allowed: a driver or shaft that turns.")
+    run = model.simulate(
+        duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=parameters, outputs=[], progress=False
+    )
+    try:
+        period = forcing_period(model, model.numbers(parameters), run.t, run.x, None)
+    except RequestError:  # no common period: readings are taken each turn, and the report says so
+        period = None
+    if period is not None and period.time(model.numbers(parameters).values) <= LONGEST_STROBE * turn:
+        return (lambda given: period.time(model.numbers(given).values)), f"each time {period.words}", True
+    return model.period, "once a turn, after which balls are elsewhere", False
+
+
+def _motion(
+    model: AnyModel,
+    parameters: Mapping[str, float],
+    value: float,
+    step_of: Callable[[Mapping[str, float]], float],
+    start: np.ndarray | None,
+    readings: int,
+    settling: int,
+    rtol: float,
+    exponent: bool,
+    forced: bool,
+) -> MotionAt:
+    """The motion at one value, from a state on."""
+    from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, strobe_with_tangent
+
+    step = step_of(parameters)
+    count = max(settling, 1) if exponent else settling + readings
+    run = model.simulate(
+        duration=count * step,
+        times=step * np.arange(1, count + 1),
+        parameters=parameters,
+        initial=start,
+        rtol=rtol,
+        outputs=[],
+        transient=0.0,
+        progress=False,
+    )
+    magnitude, grown = np.array(run.statistics.magnitudes), None
+    states = run.x[settling:]
+    if exponent:
+        states, growth = strobe_with_tangent(model, model.numbers(parameters), run.end, step, readings, magnitude, rtol)
+        grown = exponent_of(growth)
+    return MotionAt(
+        value=value,
+        states=states,
+        exponent=grown,
+        kind=kind_of_motion(states, magnitude, grown, forced=forced),
+    )
