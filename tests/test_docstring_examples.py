@@ -55,7 +55,8 @@ INTERNAL = {
     "Reductions.table_html",
     "SolutionPlot.__call__",
 }
-#: Examples that take long, or need what not every installation has: ziglang compiles for a page, the first time a minute.
+#: Examples that take long, or need what not every installation has: ziglang compiles for a page, which takes a minute
+#: the first time.
 MARKS = {
     "Model.explore": (
         pytest.mark.long,

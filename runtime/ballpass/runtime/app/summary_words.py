@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.ratings.load_ratings import STATIC_PRESSURE
-from ballpass.runtime.ratings.of_bearing import contacts_of
+from ballpass.runtime.ratings.elements import RatedElement
+from ballpass.runtime.ratings.of_bearing import contacts_of, rated_element
 from ballpass.runtime.run.driver_angle import crank_angle
 
 #: What shortens a description, in this order.
@@ -60,7 +60,8 @@ def row_words(manifest: Manifest, name: str) -> str:
     prefix, own = _of_bearing(manifest, name)
     whose = f" of {prefix.removesuffix('.')}" if prefix else ""
     if own in _ADDED:
-        return f"{_ADDED[own]}{',' + whose.removeprefix(' of') if whose else ''}"
+        noun = next((rated_element(one).noun for one in manifest.bearings if one.prefix == prefix), "ball")
+        return f"{_ADDED[own].replace('ball', noun)}{',' + whose.removeprefix(' of') if whose else ''}"
     infos = (*manifest.states, *manifest.outputs)
     found = next((info.description for info in infos if info.name == name), "")
     paths = {f"{bearing.prefix}{key}": f"{bearing.path}.{key}" for bearing in manifest.bearings for key in (own,)}
@@ -84,13 +85,14 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
     ----------
     values : parameters and derived constants of the run by name
     """
-    said, highest = [], 0.0
+    said: list[str] = []
+    beyond: list[RatedElement] = []
     for bearing in manifest.bearings:
         peak = summary.get(f"{bearing.prefix}peak_ball_force")
         if peak is None or "total" not in peak:
             continue
         force, time = peak["total"], peak["time"]["total"]
-        place = f"ball {peak['ball']['total']} at {time:.5g} s"
+        place = f"{rated_element(bearing).noun} {peak['ball']['total']} at {time:.5g} s"
         if manifest.mechanism is None or not manifest.mechanism.angle:
             turning = "crank" if manifest.mechanism is not None else "shaft"
             place += f", {turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
@@ -98,16 +100,20 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
             (float(contact.peak_pressure(force)), ring)
             for contact, ring in zip(contacts_of(bearing, values), ("inner", "outer"), strict=True)
         )
-        highest = max(highest, pressure)
+        element = rated_element(bearing)
+        if pressure > element.static_pressure:
+            beyond.append(element)
         whose = f" of {bearing.name}" if bearing.name else ""
         said.append(
-            f"Highest ball force{whose}: {force:.4g} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} raceway."
+            f"Highest {element.noun} force{whose}: {force:.4g} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} "
+            "raceway."
         )
-    if highest > STATIC_PRESSURE:
-        said.append(
-            f"Above {STATIC_PRESSURE / 1e6:.0f} MPa (ISO 76) a dent of about a ten-thousandth of the ball's diameter "
-            "remains: see ballpass life."
-        )
+    limits = {element.noun: element.static_pressure for element in beyond}
+    said += [
+        f"Above {limit / 1e6:.0f} MPa (ISO 76) a dent of about a ten-thousandth of the {noun}'s diameter remains: see "
+        "ballpass life."
+        for noun, limit in limits.items()
+    ]
     return said
 
 

@@ -10,15 +10,13 @@ from collections.abc import Iterator, Mapping
 
 from ballpass.runtime.ask.life_records import BearingStrength
 from ballpass.runtime.contract import BearingInfo
+from ballpass.runtime.ratings.of_bearing import geometry_of, rated_element
 
 #: Largest equivalent load over C_r for which ISO 281 gives a life [1].
 LARGEST_LOAD = 0.5
 
 #: Least load over C_r with which balls roll, from makers' catalogues [1].
 LEAST_LOAD = 0.01
-
-#: Peak pressure at which a ball leaves a dent of 1e-4 of its diameter, ISO 76 [Pa].
-STATIC_PRESSURE = 4.2e9
 
 #: Pitch diameter times speed that grease allows, from makers' catalogues [m*rad/s]: 500 000 mm/min.
 SPEED_FACTOR = 500.0 * 2.0 * math.pi / 60.0
@@ -29,6 +27,8 @@ DENSITY, CENTRIFUGAL = 7800.0, 0.1
 
 def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStrength) -> Iterator[str]:
     """What the bearing is beyond."""
+    element, geometry = rated_element(info), geometry_of(info, values)
+    noun = element.noun
     load, dynamic, static = found.equivalent_load, found.dynamic_rating, found.static_rating
     if not found.why_no_life and load > LARGEST_LOAD * dynamic:
         yield (
@@ -40,26 +40,25 @@ def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStre
     if not found.why_no_life and load < LEAST_LOAD * dynamic:
         yield (
             f"P = {load:.3g} N is {load / dynamic:.2g} C_r: below {LEAST_LOAD:g} C_r, the minimum load of makers' "
-            "catalogues, balls slide, and wear decides, not fatigue. Preload it, or take a smaller bearing."
+            f"catalogues, {noun}s slide, and wear decides, not fatigue. Preload it, or take a smaller bearing."
         )
     pressure = max(found.inner.peak_pressure, found.outer.peak_pressure)
-    if pressure > STATIC_PRESSURE:
+    if pressure > element.static_pressure:
         yield (
-            f"the peak pressure, {pressure / 1e6:.0f} MPa, exceeds {STATIC_PRESSURE / 1e6:.0f} MPa, the static limit "
-            "of ISO 76: balls leave dents, which the model has not."
+            f"the peak pressure, {pressure / 1e6:.0f} MPa, exceeds {element.static_pressure / 1e6:.0f} MPa, the static "
+            f"limit of ISO 76: {noun}s leave dents, which the model does not have."
         )
     if found.static_safety < 1.0:
         yield f"the static safety s_0 = {found.static_safety:.2g} is below 1, the least of ISO 76."
-    ball, pitch = values[f"{info.path}.ball_diameter"], values[f"{info.path}.pitch_diameter"]
-    speed = abs(found.speed)
+    pitch, speed = float(geometry.pitch), abs(found.speed)
     # the outer ring stands: the cage turns at (1 - gamma)/2 of the speed
-    centrifugal = DENSITY * math.pi / 6.0 * ball**3 * 0.5 * pitch * (0.5 * (1.0 - ball / pitch) * speed) ** 2
+    centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * (0.5 * (1.0 - geometry.gamma) * speed) ** 2
     share = 5.0 * load / info.balls
     if centrifugal > CENTRIFUGAL * share:
         yield (
-            f"the centrifugal force of a ball, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the heaviest "
-            f"ball's share of P, {share:.3g} N: the model's balls have no mass, which holds to some {CENTRIFUGAL:g}. "
-            "The outer ring carries more than is said here."
+            f"the centrifugal force of a {noun}, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the heaviest "
+            f"{noun}'s share of P, {share:.3g} N: the model's {noun}s have no mass, which holds to some "
+            f"{CENTRIFUGAL:g}. The outer ring carries more than is said here."
         )
     if pitch * speed > SPEED_FACTOR:
         yield (

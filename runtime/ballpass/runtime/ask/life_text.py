@@ -160,23 +160,36 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
     ]
     parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
-        f"  C_r {_force(bearing.dynamic_rating)} ({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
-        f"C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
-        f"C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
+        f"  {_verdict(bearing)}",
+        f"  load ratings: dynamic C_r {_force(bearing.dynamic_rating)} "
+        f"({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
+        f"static C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
+        f"fatigue limit C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
         f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
-        f"  static safety s_0 {bearing.static_safety:.3g}",
         ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
     ]
     if bearing.why_no_life:
         return [*parts, f"  No rating life. {bearing.why_no_life}"]
     lives = {
-        f"L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
+        f"basic L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
         **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},
     }
     if bearing.factor is not None:
-        lives[f"L_nmr, a_ISO {bearing.factor:.3g}, kappa {bearing.viscosity_ratio:.3g}"] = bearing.modified_life
+        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, viscosity ratio {bearing.viscosity_ratio:.3g}"
+        lives[words] = bearing.modified_life
     known = {name: life for name, life in lives.items() if life is not None}
     return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]
+
+
+def _verdict(bearing: BearingStrength) -> str:
+    """What the numbers mean."""
+    held = "bears its highest load" if bearing.static_safety >= 1.0 else "brinells at its highest load"
+    verdict = f"It {held}: static safety s_0 {bearing.static_safety:.3g}."
+    shortest = bearing.life if bearing.modified_life is None else bearing.modified_life
+    if shortest is None:
+        return verdict
+    spent = "without limit" if math.isinf(shortest) else f"{bearing.hours(shortest):.0f} h or longer"
+    return f"{verdict} 90 % of such bearings run {spent}."
 
 
 def _duty_parts(life: DutyLife) -> _Parts:
@@ -185,13 +198,13 @@ def _duty_parts(life: DutyLife) -> _Parts:
         return ["", head, f"  No rating life. {life.why_no_life}"]
     lives = {_reading_words(name, life.governing): (life.turns[name], spent) for name, spent in life.hours.items()}
     if life.modified_hours is not None and life.modified_turns is not None:
-        lives["L_nmr"] = life.modified_turns, life.modified_hours
+        lives["modified L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
     return ["", head, _lives(lives), f"  Damage: {shares}."]
 
 
 def _reading_words(reading: str, governing: str) -> str:
-    return f"L_10r by {reading}{GOVERNS if reading == governing else ''}"
+    return f"reference L_10r by {reading}{GOVERNS if reading == governing else ''}"
 
 
 def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,8 +48,12 @@ class RatedBall(RatedElement):
     name = "ball"
     noun = "ball"
     limit_words = "C_0r/22"
-    contact_words = "ellipse, a x b"
+    contact_words = "half axes of the contact ellipse"
+    static_pressure = load_ratings.STATIC_PRESSURE
     life = life.BALLS
+
+    def volume(self, geometry: ElementGeometry) -> Any:
+        return math.pi / 6.0 * geometry.diameter**3
 
     def dynamic_rating(self, geometry: ElementGeometry) -> Any:
         return load_ratings.dynamic_rating(geometry.balls, geometry.diameter, geometry.pitch, self._grooves(geometry))

@@ -66,7 +66,8 @@ class RatedCylindricalRoller(RatedElement):
     name = "cylindrical-roller"
     noun = "roller"
     limit_words = "C_0r/8.2"
-    contact_words = "contact, l/2 x b"
+    contact_words = "half length and width of the contact"
+    static_pressure = 4.0e9
     life = ElementLife(
         basic=Fraction(10, 3),
         turning=Fraction(4),
@@ -75,6 +76,9 @@ class RatedCylindricalRoller(RatedElement):
             most=1.5859, falls=(1.3993, 1.2348, 1.2348), power=1.0, limit_power=Fraction(2, 5), exponent=9.185
         ),
     )
+
+    def volume(self, geometry: ElementGeometry) -> Any:
+        return math.pi / 4.0 * geometry.diameter**2 * geometry.contact["length"]
 
     def dynamic_rating(self, geometry: ElementGeometry) -> Any:
         """C_r = b_m f_c l^(7/9) Z^(3/4) D_w^(29/27), lengths in mm [N]."""
