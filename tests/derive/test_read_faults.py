@@ -304,7 +304,7 @@ def test_a_wrong_press_is_refused_with_key_and_remedy(old: str, new: str, key: s
 # The same, as edits of the scene without a mechanism.
 REFUSED_ROTOR = [
     ("joint without mechanism", "[bearing]\n", '[bearing]\njoint = "A"\n', "bearing.joint", "delete the key"),
-    ("share without mechanism", "[bearing]\n", "[bearing]\nshare = 0.5\n", "bearing.share", "delete the key"),
+    ("share above one", "[bearing]\n", "[bearing]\nshare = 1.5\n", "bearing.share", "give the part of the load"),
     (
         "bearing without load",
         '[load]\ntype = "constant"',

@@ -57,10 +57,10 @@ class AngleState(Drive):
             changes=f"`gate.{name}`",
         )
 
-    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
-        """Value over the angle after the first knot, without whole turns."""
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
+        """Value over the angle after the first knot, without whole periods."""
         knots, heights = ([sp.Symbol(path, real=True) for path in column] for column in (angles, values))
-        turn, past = 2 * sp.pi, DRIVER_ANGLE - knots[0]
+        turn, past = 2 * turns * sp.pi, DRIVER_ANGLE - knots[0]
         behind = Definition(
             symbol=sp.Symbol(f"{name}.angle", real=True),
             expression=past - turn * sp.floor(past / turn, evaluate=False),

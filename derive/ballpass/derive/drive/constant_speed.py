@@ -38,8 +38,27 @@ class ConstantSpeed(Drive):
         )
         return OverAngle(value=gate.symbol, inputs=(gate,))
 
-    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
-        """Value at the reference time, plus slope over the angle times the angle turned since then."""
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
+        """Value at the reference time, plus slope over the angle times the angle turned since then.
+
+        A table over several turns is one over the angle divided by these: that repeats after a turn.
+        """
+        divided: list[Definition] = []
+
+        def part(path: str, place: str, unit: str, words: str) -> str:
+            """Name of a number divided by the turns."""
+            if turns == 1:
+                return path
+            symbol = sp.Symbol(f"{name}.{place}", real=True)
+            latex = rf"\mathrm{{{place.replace('_', ' ')}}}_{{\mathrm{{{name}}}}}"
+            words = f"{words} of the table of {name}, over its {turns} turns"
+            expression = sp.Symbol(path, real=True) / turns
+            divided.append(Definition(symbol=symbol, expression=expression, unit=unit, description=words, latex=latex))
+            return str(symbol)
+
+        offset = part(self.phase.offset, "part_angle", "rad", "Start angle")
+        rate = part(self.phase.rate, "part_speed", "rad/s", "Speed")
+        angles = [part(path, f"part_angle_{k}", "rad", f"Angle {k}") for k, path in enumerate(angles, start=1)]
 
         def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
             return Input(
@@ -49,15 +68,16 @@ class ConstantSpeed(Drive):
                 unit=unit,
                 description=f"{words} of the table of {name} at the reference time",
                 latex=rf"{latex}_{{0,\mathrm{{{name}}}}}",
-                offset=self.phase.offset,
-                rate=self.phase.rate,
+                offset=offset,
+                rate=rate,
                 times=tuple(angles),
                 values=tuple(values),
             )
 
         value = entry("table", "", unit, "Value", "T")
         slope = entry("table_rate", "_slope", f"{unit}/rad", "Slope over the driver's angle", "T'")
-        return OverAngle(value=value.symbol + slope.symbol * self.speed * TIME, inputs=(value, slope))
+        passed = self.speed / turns * TIME
+        return OverAngle(value=value.symbol + slope.symbol * passed, constants=tuple(divided), inputs=(value, slope))
 
 
 def constant_speed(driver: Driver) -> ConstantSpeed:

@@ -64,8 +64,8 @@ class Drive(ABC):
         """1 while the angle lies in one of some windows, pairs of parameter names [rad], else 0."""
 
     @abstractmethod
-    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
-        """Value of a table over a turn of the angle, linear between its knots and periodic.
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
+        """Value of a table over a turn of the angle, or several, linear between its knots and periodic.
 
         Parameters
         ----------

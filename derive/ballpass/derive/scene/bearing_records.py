@@ -303,10 +303,10 @@ class Bearing:
     )
     share: SceneNumber | None = quantity(
         "1",
-        "Share of the joint's reaction, or of the shaft's load, that the bearing carries",
+        "Share of the joint's reaction that the bearing carries",
         "s",
         0.5,
-        when="one-way: required with a mechanism; two-way: refused; on a shaft the whole load without it",
+        when="one-way: required with a mechanism; two-way: refused; on a shaft, of its load: all without it",
         bounds=Bounds(least=0.0, most=1.0),
         remedy="give the part of the load that this bearing carries: 0.5 for one of a pair",
     )

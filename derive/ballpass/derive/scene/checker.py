@@ -77,13 +77,14 @@ class Checker:
                 )
         return True
 
-    def within_a_turn(self, angles: Sequence[SceneNumber]) -> None:
-        """Angles of a table that is periodic over a turn."""
-        if angles[-1].value - angles[0].value >= math.tau * (1.0 - 1e-12):
+    def within_a_turn(self, angles: Sequence[SceneNumber], turns: int = 1) -> None:
+        """Angles of a table that is periodic over a turn, or several."""
+        if angles[-1].value - angles[0].value >= turns * math.tau * (1.0 - 1e-12):
+            period = "a turn" if turns == 1 else f"{turns} turns"
             self.fault(
                 angles[-1].path,
-                "the angles of the table cover a whole turn",
+                f"the angles of the table cover {'a whole turn' if turns == 1 else period}",
                 f"{self.show(angles[0])} to {self.show(angles[-1])}",
-                "angles within less than a turn: the last row joins the first, one turn later",
-                "leave the last row out",
+                f"angles within less than {period}: the last row joins the first, {period.replace('a ', 'one ')} later",
+                "leave the last row out; a table of a force over two turns has turns = 2",
             )

@@ -1,4 +1,4 @@
-"""Law: an amount from a table over the driver's angle, linear between its knots and periodic over a turn."""
+"""Law: an amount from a table over the driver's angle, linear between knots and periodic over one turn or more."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.keys import Fill, WholeKey
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import column, read_record
+from ballpass.derive.scene.read_keys import column, declared, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
+
+#: A cycle of more turns is no machine's.
+MOST_TURNS = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AngleTable(Law):
-    """Knots `angle` [rad], increasing within a turn, and `amount` [N] or [N*m]; the last knot joins the first."""
+    """Knots `angle` [rad], increasing within `turns`, and `amount` [N] or [N*m]; the last knot joins the first."""
 
     key: ClassVar[str] = "table"
 
@@ -27,6 +30,16 @@ class AngleTable(Law):
     )
     values: tuple[SceneNumber, ...] = column(
         "COLUMN_UNIT", "THE_COLUMN in row ROW of the table of NAME", "T_{INDEX,ROW}", name="COLUMN"
+    )
+    turns: int = declared(
+        WholeKey(
+            words="Turns of the driver after which the table of NAME repeats",
+            lowest=1,
+            highest=MOST_TURNS,
+            default=1,
+            example=2,
+            note="2 for a four-stroke engine: angles up to 720 deg",
+        )
     )
 
     @classmethod
@@ -43,7 +56,7 @@ class AngleTable(Law):
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The table's value."""
         knots, values = ([q.path for q in column] for column in (self.angle, self.values))
-        return setting.over_angle(setting.drive.table(force.label, force.pathway.unit, knots, values))
+        return setting.over_angle(setting.drive.table(force.label, force.pathway.unit, knots, values, self.turns))
 
     def words(self) -> str:
         """Number of rows."""
@@ -54,4 +67,4 @@ class AngleTable(Law):
         if self.angle:
             remedy = "give every row an angle and a value, or delete the table for a load that does not change"
             checker.rows(self.angle[0].path.rpartition(".")[0], {"angle": self.angle, "value": self.values}, remedy)
-            checker.within_a_turn(self.angle)
+            checker.within_a_turn(self.angle, self.turns)

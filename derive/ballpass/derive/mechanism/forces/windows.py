@@ -119,7 +119,7 @@ class Windows(Law):
         none, full = (one.symbol.name for one in heights)
         angles = [window.start.path, *(one.symbol.name for one in knots)]
         found = setting.drive.table(name, "1", angles, [none, full, full, none])
-        return replace(found, constants=(*knots, *heights))
+        return replace(found, constants=(*knots, *heights, *found.constants))
 
     def words(self) -> str:
         """Number of windows."""
