@@ -55,7 +55,7 @@ INTERNAL = {
     "Reductions.table_html",
     "SolutionPlot.__call__",
 }
-#: Examples that take long, or need what not every installation has: ziglang compiles for a page, the first time a minute.
+#: Of examples that take long, or need what not every installation has: ziglang, whose first page takes a minute.
 MARKS = {
     "Model.explore": (
         pytest.mark.long,
