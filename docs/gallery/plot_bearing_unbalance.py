@@ -6,7 +6,7 @@ A rotor of 5 kg in a preloaded 6204 with an unbalance of 0.1 g at 20 mm. A prelo
 bearing is a spring for small motion, so that a closed form exists for the circle that
 the rotor runs on.
 
-`Play with this machine <../live/rotor.html>`__: its page has the solver in it.
+`Play with this machine <../live/rotor.html>`__ in its live page.
 """
 
 # %%

@@ -6,7 +6,7 @@ A rotor under a constant load moves although nothing shakes it: the balls pass u
 load, and the bearing is stiffer when a ball stands right below it than when two stand
 beside it.
 
-`Play with this machine <../live/varying_compliance.html>`__: its page has the solver in it.
+`Play with this machine <../live/varying_compliance.html>`__ in its live page.
 """
 
 # %%

@@ -6,7 +6,7 @@ The paper computes the reaction of an ideal linkage and loads the bearing with i
 way. In the machine the bearing's play moves the linkage as well. The same press, both
 ways.
 
-`Play with this machine <../live/punching_press_two_way.html>`__: its page has the solver in it.
+`Play with this machine <../live/punching_press_two_way.html>`__ in its live page.
 """
 
 # %%
