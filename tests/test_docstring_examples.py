@@ -55,8 +55,7 @@ INTERNAL = {
     "Reductions.table_html",
     "SolutionPlot.__call__",
 }
-#: Examples that take long, or need what not every installation has: ziglang compiles for a page, which takes a minute
-#: the first time.
+#: Of examples that take long, or need what not every installation has: ziglang, whose first page takes a minute.
 MARKS = {
     "Model.explore": (
         pytest.mark.long,

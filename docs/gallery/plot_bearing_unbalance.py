@@ -5,6 +5,8 @@ Unbalanced rotor, over speed
 A rotor of 5 kg in a preloaded 6204 with an unbalance of 0.1 g at 20 mm. A preloaded
 bearing is a spring for small motion, so that a closed form exists for the circle that
 the rotor runs on.
+
+`Play with this machine <../live/rotor.html>`__ in its live page.
 """
 
 # %%

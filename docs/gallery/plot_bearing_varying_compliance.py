@@ -5,6 +5,8 @@ Varying compliance
 A rotor under a constant load moves although nothing shakes it: the balls pass under the
 load, and the bearing is stiffer when a ball stands right below it than when two stand
 beside it.
+
+`Play with this machine <../live/varying_compliance.html>`__ in its live page.
 """
 
 # %%

@@ -4,6 +4,8 @@ A four-bar of your own
 
 Lengths are parameters: they change without deriving or compiling. A linkage that does
 not close is refused, with the joint and the angle where it fails.
+
+`Play with this machine <../live/four_bar.html>`__ in its live page.
 """
 
 # %%

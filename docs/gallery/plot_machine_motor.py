@@ -5,6 +5,8 @@ A motor with a flywheel
 A crank that turns at constant speed needs a drive that gives any torque. Here an
 asynchronous motor turns the press: the punch slows the flywheel down, and the motor
 brings it back in the rest of the turn.
+
+`Play with this machine <../live/punching_press_motor.html>`__ in its live page.
 """
 
 # %%

@@ -4,6 +4,8 @@ Run the punching press
 
 The press of the paper: a crank-slider at 500 rpm, punched between 237° and 267°, whose
 crank turns in a 6204 bearing.
+
+`Play with this machine <../live/punching_press.html>`__ in its live page.
 """
 
 # %%

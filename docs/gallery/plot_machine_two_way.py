@@ -5,6 +5,8 @@ One-way or two-way coupling
 The paper computes the reaction of an ideal linkage and loads the bearing with it: one
 way. In the machine the bearing's play moves the linkage as well. The same press, both
 ways.
+
+`Play with this machine <../live/punching_press_two_way.html>`__ in its live page.
 """
 
 # %%

@@ -43,7 +43,7 @@ NOT_RUN = {
     r"(python -m pip|pipx) (install|download)|python -m build|rattler-build": "installs; tests/test_package.py does it",
     r"dask (scheduler|worker)": "they do not end",
     r".* --scheduler tcp:": "needs them",
-    r"ballpass explore ": "needs ziglang, which not every environment has; tests/runtime/test_explore.py runs it",
+    r"(\.venv/bin/)?ballpass explore ": "needs ziglang; tests/runtime/test_explore.py runs it",
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
     r".* --of life_sectors --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
 }

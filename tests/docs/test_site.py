@@ -60,6 +60,8 @@ def rendered(address: str, profile: Path) -> str:
     ("page", "formulas", "shown"),
     [
         ("index.html", 0, "How fast"),
+        ("machines.html", 0, "Toggle press"),
+        ("live/punching_press.html", 0, 'data-result="peak_ball_force"'),
         ("theory/bearing.html", 20, "Energies, dissipation, virtual work"),
         ("theory/press.html", 50, "Equations"),
         ("auto_gallery/index.html", 0, "Eq. (1) from the geometry"),

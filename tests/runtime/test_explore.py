@@ -140,7 +140,7 @@ def test_pages_of_other_machines_give_native_peaks_and_positions(
     peak = model.refine_peak(solution.steady(), f"{bearing}ball.force").value
     assert found[f"{bearing}peak_ball_force"] == pytest.approx(peak, rel=1e-6)
     # Positions, forces and angles are those that the page brings of the native run, of five digits.  Not so where the
-    # last bit of a number changes a native run by more: 1e-4 of the four-bar's ball forces, and the toggle's rattling.
+    # last bit of a number changes a native run by more: 1e-4 of the four-bar's ball forces, what rattles in the toggle.
     own = browser.value("({ brought: numbers, solved: data })") if scene not in ("four_bar", "toggle_press") else {}
     for path in _signals(own.get("brought")):
         (native, digits), (solved, _) = (_at(own[kind], path) for kind in ("brought", "solved"))
