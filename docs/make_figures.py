@@ -61,6 +61,13 @@ ANSWERS = {
         ),
         "bifurcation",
     ),
+    "optimize_trace": (
+        (
+            *("optimize", "punching_press.toml", "--minimize", "peak_ball_force", "--cycles", "4", "--transient", "2"),
+            *("--starts", "1", "--vary", "bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log"),
+        ),
+        "trace",
+    ),
 }
 
 #: Keys of the press's bearing that a designation gives.

@@ -52,6 +52,10 @@ TABLES = {
 #: reason is the name of a file, the file holds the numbers; where it begins with "=", it computes them from others of
 #: the page.
 NAMED: dict[str, dict[str, str]] = {
+    "docs/howto/optimize.md": {
+        "is least, 3685.164 N": "an independent program; test_optimize.py",
+        "limits another quantity": "a statement",
+    },
     "docs/howto/bifurcation.md": {
         "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",
         "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of ask/lyapunov.py",

@@ -34,6 +34,7 @@ class ParameterRange:
     low, high : ends as they were written, SI
     count : of values; 0 where none was asked for
     shown_unit, factor : the unit that the first end was written in, and its size in `unit`
+    logarithmic : whether equal shares are equal factors
     """
 
     name: str
@@ -44,6 +45,19 @@ class ParameterRange:
     count: int = 0
     shown_unit: str = ""
     factor: float = 1.0
+    logarithmic: bool = False
+
+    def at(self, share: float) -> float:
+        """The value that lies so far on the way from the first end to the second, SI."""
+        if self.logarithmic:
+            return float(self.low * (self.high / self.low) ** share)
+        return self.low + share * (self.high - self.low)
+
+    def slope(self, share: float) -> float:
+        """Derivative of that value by the share."""
+        if self.logarithmic:
+            return self.at(share) * float(np.log(self.high / self.low))
+        return self.high - self.low
 
 
 def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool = False) -> ParameterRange:
@@ -59,11 +73,12 @@ def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool
     RequestError
         Another form, an unknown parameter, a wrong unit, or ends that are equal or out of bounds.
     """
-    shape = "PATH=A:B:N" if counted else "PATH=A:B"
+    shape = "PATH=A:B:N" if counted else "PATH=A:B or PATH=A:B:log"
     example = 'bearing.clearance="5 um:40 um' + (':80"' if counted else '"')
     path, equals, written = (part.strip() for part in text.partition("="))
     parts = [part.strip() for part in written.split(":")]
-    if not equals or len(parts) != (3 if counted else 2):
+    logarithmic = not counted and parts[2:] == ["log"]
+    if not equals or len(parts) != (3 if counted or logarithmic else 2):
         raise RequestError(f"{option}: {text!r:.80} is no range. Allowed: {shape}, as in {example}.")
     infos = {info.name: info for info in manifest.parameters}
     if path not in infos:
@@ -77,6 +92,8 @@ def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool
         raise RequestError(f"{option} {path}: both ends are {parts[0]}. Allowed: two ends that differ.")
     if outside(info, np.array([low, high])).any():
         raise RequestError(f"{option} {path}: {written} goes beyond its bounds. Allowed: numbers {bounds_text(info)}.")
+    if logarithmic and min(low, high) <= 0.0:
+        raise RequestError(f"{option} {path}: numbers from zero down have no logarithm. Leave :log away.")
     count = 0
     if counted:
         if not parts[2].isdecimal() or not 2 <= int(parts[2][:9]) <= MOST:
@@ -94,4 +111,5 @@ def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool
         count=count,
         shown_unit=shown,
         factor=parse_quantity(f"1 {shown}", info.unit) if shown != "1" else 1.0,
+        logarithmic=logarithmic,
     )

@@ -10,6 +10,7 @@ from ballpass.runtime.questions.bifurcation import bifurcation
 from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
+from ballpass.runtime.questions.optimize import optimize
 from ballpass.runtime.questions.sensitivity import sensitivity
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.questions.steady import steady
@@ -22,6 +23,7 @@ class Questions:
     checked_jacobian = checked_jacobian
     life = life
     linearize = linearize
+    optimize = optimize
     sensitivity = sensitivity
     spectrum = spectrum
     steady = steady

@@ -1,0 +1,28 @@
+"""The way of a search to the least value: values of the goal at each evaluation.
+
+In: values.  Out: a figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ballpass.runtime.plot.style import INK, SIGNAL, caption, label, new_figure, styled
+
+
+@styled
+def draw_trace(goal: str, unit: str, trace: Sequence[float]) -> Figure:
+    """Values in the order of the evaluations, and the least so far."""
+    figure = new_figure(4.0)
+    axes = figure.add_subplot()
+    number = np.arange(1, len(trace) + 1)
+    axes.plot(number, trace, "o", color=SIGNAL, markersize=4, label="each evaluation")
+    axes.step(number, np.minimum.accumulate(trace), where="post", color=INK, linewidth=1.4, label="least so far")
+    axes.set_xlabel(label("evaluation", "1"))
+    axes.set_ylabel(label(goal, unit))
+    axes.legend()
+    caption(figure, f"Search for the least {goal}", "Each evaluation is a run with derivatives.")
+    return figure

@@ -1,0 +1,384 @@
+"""The least value of a quantity over parameters: bounds, constraints, several starts, kinks."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.parameter_range import ParameterRange
+
+#: Candidates of which each start is the best; they run in lanes.
+CANDIDATES = 8
+
+#: Distance from a kink at which its slopes are verified, in shares of the range [1].
+BESIDE = 5e-3
+
+#: Slopes of the search and of the check agree within this share [1].
+AGREES = 1e-3
+
+#: Tolerance of the runs [1].
+RTOL = 1e-8
+
+#: A constraint, or a bound, is active within this share of its limit, or of the range [1].
+ACTIVE = 1e-5
+
+Goal = Annotated[str, Option(words="Quantity to make least, as `peak_ball_force`.", shown="Q")]
+Vary = Annotated[
+    str | Sequence[str],
+    Option(
+        words="Parameter and its bounds; `:log` behind them for equal factors. May be repeated.",
+        shown="PATH=A:B",
+        example='bearing.clearance="0 um:40 um"',
+    ),
+]
+Limits = Annotated[
+    str | Sequence[str] | None,
+    Option(words="Limit of another quantity. May be repeated.", shown='"Q <= VALUE"', example='"rms:inner.y <= 5 um"'),
+]
+Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """A constraint on a quantity.
+
+    Attributes
+    ----------
+    quantity, unit : its name and unit
+    upper : whether the quantity must stay below
+    limit : [unit]
+    value : at the optimum [unit]
+    active : whether it holds the optimum
+    multiplier : change of the goal by that of the limit [goal's unit / unit]
+    """
+
+    quantity: str
+    unit: str
+    upper: bool
+    limit: float
+    value: float = float("nan")
+    active: bool = False
+    multiplier: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Optimum(ShortRepr, Reported):
+    """The least value that was found.
+
+    Attributes
+    ----------
+    goal, unit : quantity and its unit
+    value : least value [unit]
+    vary : parameters and their bounds
+    x : their values there, SI, shape (parameters,)
+    bounds : "first", "second" or "" for each parameter: the end of its range that holds the optimum
+    slopes : of the goal by the parameters there, SI; several rows at a kink, one for each smooth part that meets there
+    limits : constraints
+    verdicts : of the check of the slopes: parameter, verdict
+    starts : where each search began and the value where it ended, SI: pairs of tuple and number
+    trace : values of the goal of the best search, in order [unit]
+    converged : whether the search ended by itself
+
+    Examples
+    --------
+    >>> found = model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1)
+    >>> found.bounds, found.kinked
+    (('first',), False)
+    """
+
+    goal: str
+    unit: str
+    value: float
+    vary: tuple[ParameterRange, ...]
+    x: np.ndarray
+    bounds: tuple[str, ...]
+    slopes: np.ndarray
+    limits: tuple[Limit, ...]
+    verdicts: tuple[tuple[str, str], ...]
+    starts: tuple[tuple[tuple[float, ...], float], ...]
+    trace: tuple[float, ...]
+    converged: bool
+
+    @property
+    def kinked(self) -> bool:
+        """Whether smooth parts meet at the optimum, none of which is least there.
+
+        Examples
+        --------
+        >>> model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1).kinked
+        False
+        """
+        return len(self.slopes) > 1
+
+    def _report(self) -> Report:
+        rows = [
+            {
+                "parameter": one.name,
+                "unit": one.unit,
+                "value": value,
+                "bound": bound,
+                "slopes": self.slopes[:, k].tolist(),
+            }
+            for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
+        ]
+        table = ReportTable(
+            title=f"Least {self.goal}: {self.value:.9g} {self.unit}",
+            heads=("parameter", "value", "unit", "held by", f"slopes, {self.unit} over SI"),
+            rows=[
+                (
+                    one.name,
+                    f"{value / one.factor:.8g}",
+                    one.shown_unit,
+                    f"{bound} end" if bound else "",
+                    ", ".join(f"{slope:.5g}" for slope in self.slopes[:, k]),
+                )
+                for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
+            ],
+            right=("value",),
+        )
+        said = [
+            f"{limit.quantity} is {limit.value:.6g} {limit.unit}, limit {limit.limit:.6g}: "
+            + (
+                f"active, multiplier {limit.multiplier:.4g} {self.unit}/({limit.unit})"
+                if limit.active
+                else "not active"
+            )
+            for limit in self.limits
+        ]
+        if self.kinked:
+            said.append(
+                f"A kink: {len(self.slopes)} smooth parts meet here, and the goal grows on each side. Slopes are those "
+                "of the parts."
+            )
+        checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts)
+        said.append(f"slopes {'beside the kink ' if self.kinked else ''}by a second route: {checked}")
+        said.append(
+            f"{len(self.starts)} starts ended at {', '.join(f'{end:.7g}' for _, end in self.starts)} {self.unit}"
+        )
+        wrong = [name for name, verdict in self.verdicts if verdict == "disagrees"]
+        broken = [one.quantity for one in self.limits if _over(one) > ACTIVE]
+        fault = ""
+        if wrong:
+            fault = f"Slopes by {', '.join(wrong)} disagree with the second route: this need not be the least value."
+        elif broken:
+            fault = f"No values within the bounds keep the limit of {', '.join(broken)}."
+        elif not self.converged:
+            fault = "The search did not end by itself. Give more starts or narrower bounds."
+        facts = {
+            "goal": self.goal,
+            "unit": self.unit,
+            "value": self.value,
+            "parameters": rows,
+            "kinked": self.kinked,
+            "limits": [
+                {
+                    "quantity": one.quantity,
+                    "unit": one.unit,
+                    "upper": one.upper,
+                    "limit": one.limit,
+                    "value": one.value,
+                    "active": one.active,
+                    "multiplier": one.multiplier,
+                }
+                for one in self.limits
+            ],
+            "verdicts": [list(pair) for pair in self.verdicts],
+            "starts": [{"start": list(start), "end": end} for start, end in self.starts],
+            "trace": list(self.trace),
+            "converged": self.converged,
+        }
+        return Report(parts=(table, *said), facts=facts, records=rows, index=("parameter",), fault=fault)
+
+
+def _over(limit: Limit) -> float:
+    """How far a quantity is beyond its limit, as a share of it [1]."""
+    beyond = (limit.value - limit.limit) * (1.0 if limit.upper else -1.0)
+    return beyond / max(abs(limit.limit), 1e-300)
+
+
+def read_limit(model: AnyModel, text: str) -> Limit:
+    """A constraint from text such as ``rms:inner.y <= 5 um``.
+
+    Raises
+    ------
+    RequestError
+        Another form, an unknown quantity, or a wrong unit.
+    """
+    from ballpass.runtime.quantity.grammar import quantities_of
+
+    match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text)
+    if match is None:
+        raise RequestError(f'subject_to: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
+    name, sign, written = match.groups()
+    unit = quantities_of(model, [name])[0].unit
+    try:
+        value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
+    except (QuantityError, ValueError) as error:
+        raise RequestError(f"subject_to {name}: {error}") from None
+    return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)
+
+
+def _figures(_model: AnyModel, found: Optimum, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.optimum import draw_trace
+
+    yield "trace", draw_trace(found.goal, found.unit, found.trace)
+
+
+def _check(_values: Mapping[str, object]) -> None:
+    need("scipy")
+
+
+@Question(stage="search", figures=_figures, check=_check)
+def optimize(
+    model: AnyModel,
+    minimize: Goal,
+    vary: Vary,
+    cycles: Cycles = None,
+    *,
+    subject_to: Limits = None,
+    starts: Starts = 3,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    progress: Progress = None,
+) -> Optimum:
+    """Find the least value of a quantity over parameters, also where it has a kink.
+
+    Peaks are the largest of many, so that their least value lies on a kink as a rule. The search works on tangent
+    planes of several points at once; slopes are exact, and checked by a second route at the optimum.
+
+    Parameters
+    ----------
+    parameters : overrides of other parameters, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        Unknown names, wrong bounds or limits, or a law whose force jumps.
+    SimulationError
+        A run failed, or its motion is chaotic, so that nothing has a slope.
+
+    Examples
+    --------
+    >>> found = model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1)
+    >>> f"{found.x[0]:.1e}"  # [m]
+    '5.0e-06'
+    """
+    from scipy.stats.qmc import Halton
+
+    from ballpass.runtime.ask.bundle import Plane, minimize_by_planes
+    from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.certify.quantity_function import QuantityFunction
+    from ballpass.runtime.point.slopes import KinkWarning
+    from ballpass.runtime.quantity.grammar import quantities_of
+
+    texts = [vary] if isinstance(vary, str) else list(vary)
+    ranges = tuple(parameter_range(model.manifest, "vary", text) for text in texts)
+    given = [subject_to] if isinstance(subject_to, str) else list(subject_to or [])
+    limits = [read_limit(model, text) for text in given]
+    names = list(dict.fromkeys([minimize, *(one.quantity for one in limits)]))
+    wrt = [one.name for one in ranges]
+    lanes, exact = (
+        QuantityFunction(model, names, wrt, cycles, transient=transient, parameters=parameters, rtol=RTOL, kinks=kinks)
+        for kinks in (None, "located")
+    )
+    signs = np.array([1.0 if one.upper else -1.0 for one in limits])
+    sizes = np.array([max(abs(one.limit), 1e-300) for one in limits])
+    rows = [names.index(one.quantity) for one in limits]
+    count = CANDIDATES * starts
+    shares = Halton(len(ranges), scramble=False).random(count + 1)[1:]  # the first is a corner
+
+    def values_at(share: np.ndarray) -> np.ndarray:
+        return np.array([one.at(float(s)) for one, s in zip(ranges, share, strict=True)])
+
+    def functions(values: np.ndarray, size: float) -> np.ndarray:
+        bounded = [
+            signs[k] * (values[row] - one.limit) / sizes[k]
+            for k, (row, one) in enumerate(zip(rows, limits, strict=True))
+        ]
+        return np.array([values[0] / size, *bounded])
+
+    with shown("searching", progress) as tell:
+        first = lanes(np.array([values_at(share) for share in shares]))
+        size = max(float(np.median(np.abs(first[:, 0]))), 1e-300)
+
+        def evaluate(share: np.ndarray) -> Plane:
+            x = values_at(share)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
+                values, slopes = exact(x), exact.jacobian(x)
+            slopes = slopes * np.array([one.slope(float(s)) for one, s in zip(ranges, share, strict=True)])
+            scaled = [slopes[0] / size, *(signs[k] * slopes[row] / sizes[k] for k, row in enumerate(rows))]
+            return Plane(x=share, values=functions(values, size), slopes=np.array(scaled))
+
+        merits = np.array(
+            [Plane(x=s, values=functions(v, size), slopes=v).merit for s, v in zip(shares, first, strict=True)]
+        )
+        found = []
+        for block in range(starts):
+            at = CANDIDATES * block + int(np.argmin(merits[CANDIDATES * block : CANDIDATES * (block + 1)]))
+            found.append((shares[at], minimize_by_planes(evaluate, shares[at])))
+            if tell is not None:
+                tell((block + 1) / (starts + 1))
+        _, least = min(found, key=lambda pair: pair[1].best.merit)
+        best = least.best
+        sides = least.sides if len(least.sides) > 1 else (best,)
+        verdicts: dict[str, str] = {}
+        for side in sides:
+            away = side.x - best.x
+            there = best.x if len(sides) == 1 else best.x + BESIDE * away / max(float(np.max(np.abs(away))), 1e-300)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", KinkWarning)
+                report = exact.certify(values_at(np.clip(there, 0.0, 1.0)), progress=False)
+                taken = exact.jacobian(values_at(np.clip(there, 0.0, 1.0)))[0]
+            for pair in report.pairs:
+                verdict = pair.check.verdict.value
+                slope = float(taken[wrt.index(pair.parameter)]) if pair.quantity == minimize else 0.0
+                if pair.quantity == minimize and abs(slope - pair.by_steps) > AGREES * abs(slope):
+                    verdict = "disagrees"
+                if pair.quantity == minimize and verdicts.get(pair.parameter) != "disagrees":
+                    verdicts[pair.parameter] = verdict
+    by_share = np.array([one.slope(float(s)) for one, s in zip(ranges, best.x, strict=True)])
+    return Optimum(
+        goal=minimize,
+        unit=quantities_of(model, [minimize])[0].unit,
+        value=float(best.values[0]) * size,
+        vary=ranges,
+        x=values_at(best.x),
+        bounds=tuple("first" if s < ACTIVE else "second" if s > 1.0 - ACTIVE else "" for s in best.x.tolist()),
+        slopes=np.array([side.slopes[0] * size / by_share for side in sides]),
+        limits=tuple(
+            Limit(
+                quantity=one.quantity,
+                unit=one.unit,
+                upper=one.upper,
+                limit=one.limit,
+                value=one.limit + signs[k] * float(best.values[k + 1]) * sizes[k],
+                active=bool(abs(best.values[k + 1]) < ACTIVE),
+                multiplier=-float(signs[k] * least.multipliers[k] * size / sizes[k]),
+            )
+            for k, one in enumerate(limits)
+        ),
+        verdicts=tuple(verdicts.items()),
+        starts=tuple((tuple(values_at(share).tolist()), float(one.best.values[0]) * size) for share, one in found),
+        trace=tuple(float(one.values[0]) * size for one in least.trace),
+        converged=least.converged,
+    )

@@ -1,0 +1,106 @@
+"""Least values: kinks against a closed form and an independent program, constraints with multipliers, wrong slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model, QuantityFunction, RequestError
+from ballpass.runtime.ask.bundle import Plane, minimize_by_planes
+
+
+def _planes(*functions: Callable[[np.ndarray], tuple[float, np.ndarray]]) -> Callable[[np.ndarray], Plane]:
+    def evaluate(x: np.ndarray) -> Plane:
+        pairs = [one(x) for one in functions]
+        return Plane(x=x, values=np.array([v for v, _ in pairs]), slopes=np.array([g for _, g in pairs]))
+
+    return evaluate
+
+
+def test_a_kink_in_two_variables_is_hit_from_any_start() -> None:
+    """The goal |x - 0.3| + 2 |y - 0.6|, least 0 at a corner of four smooth parts."""
+
+    def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
+        away = x - np.array([0.3, 0.6])
+        return float(np.abs(away) @ [1.0, 2.0]), np.where(away >= 0.0, [1.0, 2.0], [-1.0, -2.0])
+
+    for start in ([0.9, 0.1], [0.05, 0.95], [0.31, 0.2]):
+        found = minimize_by_planes(_planes(goal), np.array(start))
+        assert found.best.x == pytest.approx([0.3, 0.6], abs=1e-6)
+        assert len(found.sides) > 1
+        assert found.converged
+
+
+def test_a_smooth_minimum_on_a_constraint_has_the_multiplier_of_lagrange() -> None:
+    """x^2 + y^2 with x + y >= 0.8: least at (0.4, 0.4); the goal is 0.32 there and grows by 0.8 of the limit."""
+
+    def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
+        return float(x @ x), 2.0 * x
+
+    def limit(x: np.ndarray) -> tuple[float, np.ndarray]:
+        return 0.8 - float(x.sum()), -np.ones(2)
+
+    found = minimize_by_planes(_planes(goal, limit), np.array([0.9, 0.2]))
+    assert found.best.values[0] == pytest.approx(0.32, abs=1e-6)
+    assert found.best.x == pytest.approx([0.4, 0.4], abs=1e-3)
+    assert found.multipliers == pytest.approx([0.8], abs=1e-2)
+
+
+@pytest.mark.long
+def test_the_least_peak_of_the_press_over_housing_damping_is_the_kink_of_an_independent_program(
+    make_model: Callable[..., Model],
+) -> None:
+    found = make_model("punching_press").optimize(
+        "peak_ball_force",
+        "bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log",
+        cycles=4,
+        transient=2,
+        starts=1,
+    )
+    assert found.value == pytest.approx(3685.164, abs=2e-3)
+    assert found.x[0] == pytest.approx(3426.31, abs=0.01)
+    assert found.kinked
+    per_decade = sorted((found.slopes[:, 0] * found.x[0] * np.log(10.0)).tolist())
+    assert per_decade[0] == pytest.approx(-1565.0, rel=0.01)
+    assert per_decade[-1] == pytest.approx(700.0, rel=0.01)
+    assert "disagrees" not in dict(found.verdicts).values()
+
+
+def test_a_wrong_gradient_is_caught(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
+    press = make_model("punching_press")
+    slopes = QuantityFunction.jacobian
+    monkeypatch.setattr(QuantityFunction, "jacobian", lambda self, x: 1.1 * slopes(self, x))
+    found = press.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1)
+    assert "disagree" in found.report().fault
+
+
+@pytest.mark.long
+def test_two_parameters_with_an_active_limit(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press")
+    found = press.optimize(
+        "peak_ball_force",
+        ["bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log", "bearing.clearance=5 um:15 um"],
+        cycles=4,
+        transient=2,
+        subject_to="rms:inner.y >= 8 um",
+        starts=1,
+    )
+    (limit,) = found.limits
+    assert limit.active
+    assert limit.value == pytest.approx(8e-6, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("vary", "limit", "words"),
+    [
+        ("bearing.clearance=0 um", None, "is no range"),
+        ("bearing.clearance=0 um:5 um:log", None, "no logarithm"),
+        ("bearing.clearance=1 um:5 um", "rms:inner.y", "is no limit"),
+        ("bearing.clearance=1 um:5 um", "rms:inner.y <= 5 N", "rms:inner.y"),
+    ],
+)
+def test_wrong_requests_are_refused(make_model: Callable[..., Model], vary: str, limit: str | None, words: str) -> None:
+    with pytest.raises(RequestError, match=words):
+        make_model("punching_press").optimize("peak_ball_force", vary, subject_to=limit)
