@@ -12,6 +12,8 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 from ballpass.runtime.app.cli import app
+from ballpass.runtime.contract.folder import read_manifest
+from ballpass.runtime.export.c_program import export_c, started
 
 #: A crank alone on its bearing, lightly damped: rings that fall through the clearance hit with twice the steady load.
 FOUR = """
@@ -118,3 +120,14 @@ def test_peaks_of_scenes_without_a_run_are_those_of_the_steady_machine(
         name = f"{bearing.prefix}ball.force"
         if name not in uncertain:
             assert again[name].maximum == pytest.approx(found[name].maximum, rel=1e-3)
+
+
+def test_exported_programs_start_where_runs_do(plain: Model, tmp_path: Path) -> None:
+    written = read_manifest(plain.folder)
+    assert written.parameters != plain.manifest.parameters
+    assert started(plain.folder, written).manifest.parameters == plain.manifest.parameters
+    program = export_c(plain.folder, tmp_path / "program")
+    starts = [value for name, value in plain.parameters.items() if ".initial." in name and value != 0.0]
+    assert starts
+    source = (program / "scene.c").read_text(encoding="utf-8")
+    assert all(repr(value) in source for value in starts)

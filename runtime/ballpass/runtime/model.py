@@ -117,7 +117,7 @@ class Model(PointModel, Questions):
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
         self._assembled = b""  # parameters whose linkage was looked at last
-        if manifest.run.at_rest and self.has("static_forces"):
+        if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
 
             self.manifest = seated(self)

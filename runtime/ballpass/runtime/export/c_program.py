@@ -70,8 +70,7 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
-    # in CasADi's virtual machine: writing C needs no compiler
-    texts = program_texts(LoadedModel(place, manifest, None))
+    texts = program_texts(started(place, manifest))
     check_files(place, manifest)  # another process may have written there meanwhile
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".writing-", dir=target) as name:
@@ -81,6 +80,19 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
         for file in texts:
             os.replace(made / file, target / file)
     return target
+
+
+def started(folder: Path, manifest: Manifest) -> LoadedModel:
+    """The model to export, whose rings start where those of `ballpass.runtime.load` do.
+
+    In CasADi's virtual machine: writing C needs no compiler.
+    """
+    model = LoadedModel(folder, manifest, None)
+    if manifest.run.at_rest:
+        from ballpass.runtime.point.equilibrium import seated  # with SciPy
+
+        model.manifest = seated(model)
+    return model
 
 
 def program_texts(model: LoadedModel) -> dict[str, str]:

@@ -30,7 +30,7 @@ from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts
+from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
 from ballpass.runtime.export.model_description import (
     SPEED,
@@ -89,7 +89,8 @@ def export_fmu(
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
     chosen = input_names(manifest, inputs)
-    model = LoadedModel(place, manifest, None)
+    model = started(place, manifest)
+    manifest = model.manifest
     sources = {name: text for name, text in program_texts(model).items() if name not in _PROGRAM_ONLY}
     sources |= _interface(model)
     token = _token(manifest, chosen, sources)

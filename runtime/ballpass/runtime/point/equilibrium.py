@@ -280,13 +280,15 @@ def start_at_rest(model: LoadedModel, numbers: Numbers) -> Array:
 
 
 def seated(model: LoadedModel) -> Manifest:
-    """The manifest whose rings start at rest under the load of t = 0; concentric ones where nothing holds them there.
+    """The manifest whose rings start at rest under the load of t = 0, if the scene says so and the load holds them.
 
     They stay there when other parameters change, so that runs of neighbours start alike.
     """
     manifest = model.manifest
+    if not (manifest.run.at_rest and model.has("static_forces")):
+        return manifest
     try:
-        found = _equilibrium(model, model.numbers(), 0.0, None)
+        found = _equilibrium(model, model.numbers(None), 0.0, None)
     except (RequestError, SimulationError):
         return manifest
     at = dict(zip(manifest.initial, found.x.tolist(), strict=True))
