@@ -77,19 +77,26 @@ def test_a_wrong_gradient_is_caught(make_model: Callable[..., Model], monkeypatc
 
 
 @pytest.mark.long
-def test_two_parameters_with_an_active_limit(make_model: Callable[..., Model]) -> None:
+def test_two_parameters_with_an_active_limit_against_a_fine_sweep(make_model: Callable[..., Model]) -> None:
     press = make_model("punching_press")
+    damping, clearance = "bearing.outer_ring.damping", "bearing.clearance"
     found = press.optimize(
         "peak_ball_force",
-        ["bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log", "bearing.clearance=5 um:15 um"],
+        [f"{damping}=1000 N*s/m:10000 N*s/m:log", f"{clearance}=5 um:15 um"],
         cycles=4,
         transient=2,
-        subject_to="rms:inner.y >= 8 um",
+        subject_to="rms:inner.y >= 40 um",
         starts=1,
     )
     (limit,) = found.limits
     assert limit.active
-    assert limit.value == pytest.approx(8e-6, rel=1e-4)
+    assert limit.multiplier > 0.0
+    assert limit.value == pytest.approx(40e-6, rel=1e-4)
+    grid = np.meshgrid(np.geomspace(1e3, 1e4, 25), np.linspace(5e-6, 15e-6, 25))
+    table = {damping: grid[0].ravel(), clearance: grid[1].ravel()}
+    swept = press.simulate_many(table, ["rms:inner.y", "peak_ball_force"], cycles=4, transient=2)
+    within = swept["peak_ball_force"][swept["rms:inner.y"] >= 40e-6]
+    assert found.value < within.min() < 1.02 * found.value
 
 
 @pytest.mark.parametrize(

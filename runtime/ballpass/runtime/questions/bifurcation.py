@@ -90,7 +90,8 @@ class Bifurcation(ShortRepr, Reported):
     Examples
     --------
     >>> pitch = {"bearing.pitch_diameter": 31.75e-3}  # cage ratio 3/8: a turn is a period
-    >>> found = model.bifurcation("bearing.clearance=5 um:10 um:2", parameters=pitch, readings=20, exponent=False)
+    >>> values = "bearing.clearance=5 um:10 um:2"
+    >>> found = model.bifurcation(values, parameters=pitch, readings=20, exponent=False)
     >>> [motion.kind for motion in found.up]
     ['periodic 1', 'periodic 1']
     """
@@ -202,7 +203,8 @@ def bifurcation(
     Examples
     --------
     >>> pitch = {"bearing.pitch_diameter": 31.75e-3}  # cage ratio 3/8: a turn is a period
-    >>> found = model.bifurcation("bearing.clearance=5 um:10 um:2", parameters=pitch, readings=20)
+    >>> values = "bearing.clearance=9 um:10 um:2"
+    >>> found = model.bifurcation(values, parameters=pitch, readings=20)
     >>> [motion.exponent.high < 0.0 for motion in found.up]
     [True, True]
     """

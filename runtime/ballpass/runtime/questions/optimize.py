@@ -99,7 +99,8 @@ class Optimum(ShortRepr, Reported):
 
     Examples
     --------
-    >>> found = model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1)
+    >>> clearance = "bearing.clearance=5 um:15 um"
+    >>> found = model.optimize("rms:inner.y", clearance, cycles=3, starts=1)
     >>> found.bounds, found.kinked
     (('first',), False)
     """
@@ -123,7 +124,8 @@ class Optimum(ShortRepr, Reported):
 
         Examples
         --------
-        >>> model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1).kinked
+        >>> clearance = "bearing.clearance=5 um:15 um"
+        >>> model.optimize("rms:inner.y", clearance, cycles=3, starts=1).kinked
         False
         """
         return len(self.slopes) > 1
@@ -278,7 +280,8 @@ def optimize(
 
     Examples
     --------
-    >>> found = model.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", cycles=3, starts=1)
+    >>> clearance = "bearing.clearance=5 um:15 um"
+    >>> found = model.optimize("rms:inner.y", clearance, cycles=3, starts=1)
     >>> f"{found.x[0]:.1e}"  # [m]
     '5.0e-06'
     """
@@ -371,7 +374,7 @@ def optimize(
                 unit=one.unit,
                 upper=one.upper,
                 limit=one.limit,
-                value=one.limit + signs[k] * float(best.values[k + 1]) * sizes[k],
+                value=float(one.limit + signs[k] * best.values[k + 1] * sizes[k]),
                 active=bool(abs(best.values[k + 1]) < ACTIVE),
                 multiplier=-float(signs[k] * least.multipliers[k] * size / sizes[k]),
             )
