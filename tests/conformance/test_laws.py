@@ -5,6 +5,7 @@ Everything is asked of every law of the registry; a new one needs its formula in
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable
@@ -252,6 +253,34 @@ def test_a_law_that_ends_from_above_is_held_there_alone() -> None:
     assert found.force.subs({switch.border: -sp.oo}).subs(values) == 0
     assert found.force.subs({switch.border: sp.oo}).subs(values) == sp.Rational(1, 4)
     assert found.force.subs({switch.border: sp.oo}).subs({STIFFNESS: 2, DELTA: sp.Rational(1, 4)}) == 0
+
+
+@pytest.mark.parametrize("touching", [False, True])
+def test_a_law_that_acts_while_the_ball_recedes_switches_as_its_mirror_image(touching: bool) -> None:
+    """`rest.positive(-rate)` was refused: its condition holds below its place.  Held, it is the opposite of z_+ - z."""
+    rest, gate = SmoothedRest(), Contact(stiffness=STIFFNESS, exponent=sp.Rational(3, 2)).gate(DELTA)
+    scale = COEFFICIENT * (gate if touching else 1)
+    found, other = (
+        find_switching([scale * law], DELTA, RATE, pairs=False)
+        for law in (rest.positive(-RATE), rest.positive(RATE) - RATE)
+    )
+    assert found.switches == other.switches
+    assert [s.function for s in found.switches] == [DELTA, RATE][1 - touching :]
+    for border in (-sp.oo, 0, sp.oo):
+        held = {COEFFICIENT: 3, **{s.border: border for s in found.switches}}
+        for delta, rate in itertools.product((-1, 1), (-5, 5)):
+            there = held | {DELTA: delta, RATE: rate}
+            assert found.force.subs(there) == other.force.subs(there)
+
+
+def test_a_law_that_ends_where_its_condition_does_keeps_it() -> None:
+    mirrored = sp.Piecewise((STIFFNESS * (-DELTA) ** sp.Rational(3, 2), DELTA < 0), (0, True))
+    found = find_switching([mirrored], DELTA, RATE, pairs=False)
+    (switch,) = found.switches
+    assert (switch.ends_above, switch.ends_below) == (False, True)
+    assert found.force.subs({STIFFNESS: 2, DELTA: sp.Rational(1, 4), switch.border: sp.oo}) == 0
+    assert found.force.subs({STIFFNESS: 2, DELTA: -sp.Rational(1, 4), switch.border: sp.oo}) == sp.Rational(1, 4)
+    assert found.force.subs({STIFFNESS: 2, DELTA: -sp.Rational(1, 4), switch.border: -sp.oo}) == 0
 
 
 def test_a_condition_of_something_else_is_refused() -> None:

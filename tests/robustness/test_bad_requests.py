@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, RequestError, load
+from ballpass.runtime import Model, QuantityFunction, RequestError, load
 from ballpass.runtime.app.cli import app
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -109,7 +109,7 @@ WRONG_REQUESTS = [
     ("initial", [math.nan] * 8, "initial: 8 finite numbers are expected .*NaN or inf"),
     ("initial", [[0.0] * 8], r"initial: 8 finite numbers are expected .*shape \(1, 8\)"),
     ("method", "euler", "There is no method 'euler'"),
-    ("method", 3, "There is no method 3"),
+    ("method", 3, "method: a text is expected, not 3 .int."),
 ]
 
 
@@ -120,6 +120,52 @@ def test_a_request_out_of_bounds_is_refused(model: Model, name: str, value: Any,
     given = {name: value} if name in ("cycles", "duration") else {"cycles": 0.1, name: value}
     with pytest.raises(RequestError, match=words):
         model.simulate(**given)
+
+
+MANY = {"bearing.clearance": [1e-5]}
+
+#: Each ended in a traceback of a module deep inside.
+WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
+    (lambda m: m.simulate(cycles=0.1, outputs=5), r"outputs: one name or several .* not 5 \(int\)\. Example: outputs="),
+    (lambda m: m.simulate(cycles=0.1, method=["stepper"]), r"method: a text is expected, not \['stepper'\] \(list\)"),
+    (lambda m: m.simulate(cycles=0.1, error=0.01, of=5), "of: one name or several"),
+    (lambda m: m.sensitivities(5, cycles=0.1), r"wrt: one name .* Example: wrt=\[\"bearing\.clearance\"\]"),
+    (lambda m: m.sensitivities(None, cycles=0.1), "wrt: one name or several"),
+    (lambda m: m.quantities(None, cycles=0.1), "of: one name or several"),
+    (lambda m: m.simulate_many(MANY, 5, cycles=0.1), "observables: one name or several"),
+    (lambda m: m.simulate_many(MANY, ["peak_ball_force"], cycles="3"), "cycles: a number above 0 is expected, not '3'"),
+    (lambda m: m.simulate_many(MANY, ["peak_ball_force"], client=5), "client: a Client of dask.distributed"),
+    (lambda m: m.refine_peak(5, "ball.force"), "solution: a solution of a run is expected"),
+    (lambda m: m.stream(5, sample_rate=1e4, cycles=0.1), "path: a path is expected"),
+    (lambda m: m.evaluate(0.0, outputs=5), "outputs: one name or several"),
+    (lambda m: m.breakpoints("a", 1), "finite times t0 < t1 are expected, not 'a'"),
+    (lambda m: m.jacobian([5]), "of: one name or several"),
+    (lambda m: m.jacobian("rhs", wrt=5), "wrt: one name or several"),
+    (lambda m: m.sensitivity("drive_work", [5], cycles=0.1), "wrt: one name or several"),
+    (lambda m: m.sensitivity("drive_work", agreement="a"), "agreement: a number between 0 and 1 is expected, not 'a'"),
+    (lambda m: m.checked_jacobian("rhs", 5), "wrt: one name or several"),
+    (lambda m: m.steady("a"), r"turns: 'a' \(str\) is no number\. Allowed: a number above 0"),
+    (lambda m: QuantityFunction(m, "drive_work", 5), "wrt: one name or several"),
+    (lambda m: QuantityFunction(m, "drive_work", "bearing.clearance", parameters=5), "parameters: a mapping"),
+    (lambda m: QuantityFunction(m, "drive_work", "bearing.clearance", kinks=5), "There is no choice of kinks 5"),
+    (lambda m: QuantityFunction(m, "drive_work", "bearing.clearance")("a"), "an array of numbers, SI, is expected"),
+    (lambda m: QuantityFunction(5, "drive_work", "bearing.clearance"), "model: a model that `load` gave is expected"),
+    (lambda m: load(5), "folder: a path is expected, not 5"),
+    (lambda m: load("x", compiler=5), "compiler: a text is expected, not 5"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), WRONG_TYPES, ids=[words[:40] for _, words in WRONG_TYPES])
+def test_an_argument_of_a_wrong_type_is_refused_in_words(
+    model: Model, call: Callable[[Any], object], words: str
+) -> None:
+    with pytest.raises(RequestError, match=words):
+        call(model)
+
+
+def test_names_may_be_given_in_any_kind_of_sequence(model: Model) -> None:
+    found = [model.evaluate(0.0, outputs=names) for names in ("inner.y", ["inner.y"], np.array(["inner.y"]))]
+    assert found == [{"inner.y": 0.0}] * 3
 
 
 @pytest.mark.parametrize("length", [{"duration": 1e300}, {"cycles": 1e10}, {"cycles": 1e308}])

@@ -13,6 +13,7 @@ from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
 from ballpass.runtime.contract import Manifest, read_artefact
+from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.solution import Solution, Statistics
 
 
+@typed
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
     """Load a generated folder; compile its C when no cached library fits.
 
@@ -93,6 +95,7 @@ def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
     return model
 
 
+@typed_methods
 class Model(PointModel, Questions):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 

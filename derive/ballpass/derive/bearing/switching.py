@@ -75,6 +75,7 @@ class Switching:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _SwitchPlace:
     order: float  # power of the distance with which the branches differ
+    above: bool  # whether the condition holds above the place; else below it
     ends_above: bool
     ends_below: bool
 
@@ -96,9 +97,9 @@ def smoothness_of(force: sp.Expr, deflection: sp.Symbol, rate: sp.Symbol) -> Law
     """How often a force may be differentiated, found at each of its case distinctions."""
     orders = {False: math.inf, True: math.inf}
     for condition in sp.ordered(force.atoms(Relational)):
-        of_rate, start = _border(condition, deflection, rate)
+        of_rate, start, _ = _border(condition, deflection, rate)
         decides, other = (rate, deflection) if of_rate else (deflection, rate)
-        order = _look(force, condition, decides, start, other, paired=False).order
+        order = _look(force, condition, decides, start, other, above=True, paired=False).order
         orders[of_rate] = min(orders[of_rate], order)
     return LawSmoothness(
         in_deflection=_in_words(orders[False]),
@@ -132,10 +133,10 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
     for part in parts:
         borders: dict[sp.Basic, tuple[tuple[bool, sp.Expr], _SwitchPlace]] = {}
         for condition in sp.ordered(part.atoms(Relational)):
-            of_rate, start = _border(condition, deflection, rate)
+            of_rate, start, above = _border(condition, deflection, rate)
             decides, other = (rate, deflection) if of_rate else (deflection, rate)
             paired = pairs and of_rate and start == 0 and deflection not in part.free_symbols
-            place = _look(part, condition, decides, start, other, paired=paired)
+            place = _look(part, condition, decides, start, other, above=above, paired=paired)
             if not place.kink:
                 continue
             found.setdefault((of_rate, start), []).append(place)
@@ -166,42 +167,53 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
 
 
 def _held(function: sp.Expr, border: sp.Symbol, place: _SwitchPlace) -> sp.logic.boolalg.Boolean:
-    """The condition with its sides held, as far as the laws on them can be continued."""
+    """The condition with its sides held, as far as the laws on them can be continued.
+
+    One that holds below its place is the opposite of the one that holds above it.
+    """
     held, itself = sp.StrictGreaterThan(function, border), sp.StrictGreaterThan(function, 0)
     if place.ends_above:
         held = sp.And(held, itself)
     if place.ends_below:
         held = sp.Or(held, itself)
-    return held
+    return held if place.above else sp.Not(held)
 
 
-def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tuple[bool, sp.Expr]:
-    """Whether a condition is one of the rate, and the value above which it holds."""
+def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tuple[bool, sp.Expr, bool]:
+    """Whether a condition is one of the rate, the value at which it changes, and whether it holds above that value."""
     larger = sp.expand(condition.gts - condition.lts)
     for symbol, other in ((deflection, rate), (rate, deflection)):
-        start = symbol - larger
-        if symbol in larger.free_symbols and not start.free_symbols & {symbol, other}:
-            return symbol == rate, start
+        for start, above in ((symbol - larger, True), (symbol + larger, False)):
+            if symbol in larger.free_symbols and not start.free_symbols & {symbol, other}:
+                return symbol == rate, start, above
     raise TypeError(f"the condition {condition} is expected to compare deflection or rate with a constant of the run")
 
 
 def _look(
-    part: sp.Expr, condition: Relational, decides: sp.Symbol, start: sp.Expr, other: sp.Symbol, *, paired: bool
+    part: sp.Expr,
+    condition: Relational,
+    decides: sp.Symbol,
+    start: sp.Expr,
+    other: sp.Symbol,
+    *,
+    above: bool,
+    paired: bool,
 ) -> _SwitchPlace:
     """How the two branches of a condition meet, tried with exact numbers of about one for everything else.
 
     Parameters
     ----------
+    above : whether the condition holds above `start`
     paired : whether an opposite ball has the same force with the opposite sign of what decides
     """
     rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
     numbers = {symbol: sp.Rational(sp.prime(k + 10), 37) for k, symbol in enumerate(rest)}
     meets = start.xreplace(numbers)
     least = math.inf
-    above = below = False
+    ends_above = ends_below = False
     for elsewhere in _ELSEWHERE if other in part.free_symbols else _ELSEWHERE[:1]:
         branches = []
-        for side in (sp.true, sp.false):
+        for side in (sp.true, sp.false) if above else (sp.false, sp.true):  # above the place, and below
             piece = part.xreplace({condition: side}).xreplace(numbers).xreplace({other: elsewhere})
             # the other conditions are what they are there
             branches.append(piece.xreplace({c: c.xreplace({decides: meets}) for c in piece.atoms(Relational)}))
@@ -209,9 +221,9 @@ def _look(
         if paired:
             difference += difference.xreplace({decides: -decides})
         least = min(least, _order(difference, decides, meets))
-        above = above or not _is_real(branches[0], decides, meets)
-        below = below or not _is_real(branches[1], decides, meets)
-    return _SwitchPlace(order=least, ends_above=above, ends_below=below)
+        ends_above = ends_above or not _is_real(branches[0], decides, meets)
+        ends_below = ends_below or not _is_real(branches[1], decides, meets)
+    return _SwitchPlace(order=least, above=above, ends_above=ends_above, ends_below=ends_below)
 
 
 def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr, side: int) -> list[mpmath.mpc]:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+from ballpass.runtime.contract.arguments import typed_methods
 from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
@@ -34,7 +35,7 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Estimate
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, refuse_jumps
+from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, check_kinks, refuse_jumps
 from ballpass.runtime.run.request import tolerance
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.show.progress import shown, shown_steps
@@ -47,6 +48,7 @@ class UnknownValueWarning(BallpassWarning):
     """A quantity is NaN for some parameters; the warning says why."""
 
 
+@typed_methods
 class QuantityFunction:
     """Quantities of a model over some of its parameters, all others fixed.
 
@@ -108,14 +110,16 @@ class QuantityFunction:
         chaos: Literal["refuse", "ignore"] = "refuse",
     ) -> None:
         _check_word("failed", failed, ("raise", "nan"))
+        if kinks is not None:
+            check_kinks(kinks)
         _check_word("chaos", chaos, ("refuse", "ignore"))
         self.of = (of,) if isinstance(of, str) else tuple(of)
         self.wrt = (wrt,) if isinstance(wrt, str) else tuple(wrt)
         self.shape = () if isinstance(of, str) else (len(self.of),)
         self._model, self._failed, self._chaos, self._rtol = model, failed, chaos, tolerance("rtol", rtol)
         self._kinks = STEPPED_OVER if kinks is None and not model.manifest.borders else kinks
+        numbers = model.numbers(parameters)
         self._fixed = dict(parameters or {})
-        numbers = model.numbers(self._fixed)
         for what, names in (("of", self.of), ("wrt", self.wrt)):
             if not names or len(dict.fromkeys(names)) < len(names):
                 raise RequestError(f"{what}: one name or more is expected, each once, not {list(names)!r}.")
@@ -230,7 +234,7 @@ class QuantityFunction:
         [('bearing.clearance', 'verified')]
         """
         values = self.start if x is None else self.arguments(x) if isinstance(x, Mapping) else x
-        given = np.asarray(values, dtype=float)
+        given = _array(values)
         self.check_shape(given.shape)
         if given.ndim > 1:
             raise RequestError(f"certify: one point is expected, of shape ({len(self.wrt)},), not {given.shape}.")
@@ -291,7 +295,7 @@ class QuantityFunction:
 
     def _rows(self, x: ArrayLike) -> tuple[Array, NDArray[np.int_], tuple[int, ...]]:
         """The parameters as a table, the rows to run, and the shape in front."""
-        given = np.asarray(x, dtype=float)
+        given = _array(x)
         self.check_shape(given.shape)
         rows = given.reshape(-1, len(self.wrt))
         finite = np.isfinite(rows).all(axis=1)
@@ -394,6 +398,16 @@ class QuantityFunction:
 
     def _told(self, row: Array) -> str:
         return _some([f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True)])
+
+
+def _array(x: ArrayLike) -> Array:
+    try:
+        return np.asarray(x, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise RequestError(
+            f"parameters: an array of numbers, SI, is expected, not {x!r:.60} ({type(x).__name__}). A mapping from "
+            "names goes through `arguments`."
+        ) from None
 
 
 def _check_word(what: str, given: str, allowed: tuple[str, ...]) -> None:

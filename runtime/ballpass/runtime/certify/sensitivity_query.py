@@ -38,7 +38,7 @@ from ballpass.runtime.certify.sensitivity_report import (
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
@@ -132,11 +132,11 @@ def make_query(
         A wrong request.
     """
     for name, given in (("rtol", rtol), ("sensitivity_rtol", sensitivity_rtol)):
-        if given is not None and not TOLERANCES[0] <= given <= TOLERANCES[1]:
+        if given is not None and not TOLERANCES[0] <= real(given) <= TOLERANCES[1]:
             raise RequestError(
                 f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r}."
             )
-    if agreement is not None and not 0.0 < agreement < 1.0:
+    if agreement is not None and not 0.0 < real(agreement) < 1.0:
         raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
     if not isinstance(check, bool):
         raise RequestError(f"check: True or False is expected, not {check!r}: differences are the second route.")

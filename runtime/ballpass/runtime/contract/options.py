@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
+from ballpass.runtime.contract.arguments import is_number, type_fault
 from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 
@@ -53,13 +54,17 @@ class Option:
         """Words for the command line."""
         return f"{self.words.removesuffix('.')}: `{self.flag(name)} {self.example}`." if self.example else self.words
 
-    def fault(self, name: str, value: Any) -> str | None:
+    def fault(self, name: str, kind: Any, value: Any) -> str | None:
         """Fault of a value: the given and the allowed one; None where there is none.
 
         Parameters
         ----------
         name : name of the option for the caller
+        kind : its type
         """
+        wanted = type_fault(name, str(kind), value)
+        if wanted is not None:
+            return wanted
         if self.choices and value is not None:
             wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
             allowed, right = ", ".join(self.choices), not wrong
@@ -69,6 +74,9 @@ class Option:
             allowed = self._allowed(kind)
             right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
             given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
+        elif kind in (float, int, float | None, int | None) and value is not None and not is_number(value):
+            allowed, right = self._allowed("number"), False
+            given = f"{value!r:.60} ({type(value).__name__}) is no number"
         else:
             return None
         return None if right else f"{name}: {given}. Allowed: {allowed}."
@@ -98,19 +106,19 @@ def options_of(function: Callable[..., Any]) -> dict[str, tuple[Any, Option]]:
     return options_in({name: known.get(written) for name, written in function.__annotations__.items()})
 
 
-def refuse_faults(options: Mapping[str, Option], values: Mapping[str, Any]) -> None:
+def refuse_faults(options: Mapping[str, tuple[Any, Option]], values: Mapping[str, Any]) -> None:
     """Refuse values that are not allowed, all at once; None always is.
 
     Parameters
     ----------
-    options : by their names for the caller, as are the values
+    options : with their types, by their names for the caller, as are the values
 
     Raises
     ------
     RequestError
         Numbers out of bounds, words that are none of the choices.
     """
-    found = [option.fault(name, values[name]) for name, option in options.items() if name in values]
+    found = [option.fault(name, kind, values[name]) for name, (kind, option) in options.items() if name in values]
     if any(found):
         raise RequestError("\n".join(filter(None, found)))
 

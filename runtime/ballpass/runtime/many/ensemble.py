@@ -346,8 +346,8 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     if cycles is None and duration is None:
         cycles, duration = run.cycles, run.duration
     for name, value in (("cycles", cycles), ("duration", duration)):
-        if value is not None and not 0.0 < value < np.inf:
-            raise RequestError(f"{name}: a number above 0 is expected, not {value!r}.")
+        if value is not None and not 0.0 < real(value) < np.inf:
+            raise RequestError(f"{name}: a number above 0 is expected, not {value!r:.80}.")
     count = len(members)
     durations, turns, starts = np.zeros(count), np.full(count, np.inf), np.zeros(count)
     mechanism, bearing = model.manifest.mechanism, model.manifest.bearing

@@ -40,6 +40,11 @@ def simulate_parts(
     options : of `ballpass.runtime.many.ensemble.simulate_many`, except threads: the cluster has its own
     """
     started = clocks.perf_counter()
+    if not hasattr(client, "nthreads"):
+        raise RequestError(
+            f"client: a Client of dask.distributed is expected, not {client!r:.60} ({type(client).__name__}). "
+            "Example: client=dask.distributed.Client(cluster)."
+        )
     manifest = model.manifest
     columns = read_table(manifest, table)
     count = len(next(iter(columns.values())))

@@ -19,7 +19,7 @@ def evaluate_point(
     numbers: Numbers,
     t: float,
     x: Sequence[float] | np.ndarray | None,
-    outputs: Sequence[str] | None,
+    outputs: str | Sequence[str] | None,
 ) -> dict[str, float | np.ndarray]:
     """Outputs at one time and state; see `ballpass.runtime.Model.evaluate`.
 
@@ -28,7 +28,7 @@ def evaluate_point(
     RequestError
         No such output, a time that is not finite, a state of another shape, or a linkage that cannot be assembled then.
     """
-    wanted = list(model.outputs) if outputs is None else list(outputs)
+    wanted = list(model.outputs) if outputs is None else [outputs] if isinstance(outputs, str) else list(outputs)
     for name in wanted:
         if name not in model.outputs:
             raise RequestError(no_output(model.manifest, name, model.outputs))

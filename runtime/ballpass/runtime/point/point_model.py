@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import typed_methods
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.point.equilibrium import StaticEquilibrium
 
 
+@typed_methods
 class PointModel(LoadedModel):
     """Evaluations of a model without a run.  `ballpass.runtime.model.Model` adds runs and their results."""
 
@@ -80,7 +82,7 @@ class PointModel(LoadedModel):
         >>> model.breakpoints(0.0, model.period()).round(4)  # [s]: the punch's window
         array([0.079, 0.089])
         """
-        if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
+        if not -math.inf < real(t0) < real(t1) < math.inf:
             raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
         return driver_angle.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
 
@@ -109,7 +111,7 @@ class PointModel(LoadedModel):
         self,
         t: float,
         x: Sequence[float] | np.ndarray | None = None,
-        outputs: Sequence[str] | None = None,
+        outputs: str | Sequence[str] | None = None,
         parameters: Mapping[str, float] | None = None,
     ) -> dict[str, float | np.ndarray]:
         """Outputs at one time and state.

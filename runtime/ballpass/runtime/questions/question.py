@@ -57,7 +57,7 @@ class Question:
         def checked(*given: Any, **named: Any) -> Any:
             values = signature(ask).bind(*given, **named)
             values.apply_defaults()
-            refuse_faults({name: option for name, (_, option) in options_of(ask).items()}, values.arguments)
+            refuse_faults(options_of(ask), values.arguments)
             if self.check is not None:
                 self.check(values.arguments)
             return ask(*given, **named)

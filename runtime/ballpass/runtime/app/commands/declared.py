@@ -95,7 +95,7 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
         if all(values.get(name) is not None for name in pair):
             both = " and ".join(kinds[name][1].flag(name) for name in pair)
             raise RequestError(f"{both} were both given. Allowed: one of them. Omit one.")
-    flags = {option.flag(name): option for name, (_, option) in kinds.items()}
+    flags = {option.flag(name): (kind, option) for name, (kind, option) in kinds.items()}
     refuse_faults(flags, {option.flag(name): values[name] for name, (_, option) in kinds.items()})
     return values
 

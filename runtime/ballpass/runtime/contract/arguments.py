@@ -1,0 +1,99 @@
+"""Arguments of Python calls of a wrong type, refused where they enter by what their annotations say.
+
+Names, texts and paths are looked at here; numbers where their bounds are known.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+from collections.abc import Callable, Iterable
+from numbers import Real
+from typing import Any, TypeVar, cast
+
+from ballpass.runtime.contract.errors import RequestError
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_Class = TypeVar("_Class")
+
+_NAMES, _TEXT, _PATH = "one name or several in a list", "a text", "a path"
+
+#: What is expected where these words stand in an annotation.
+_EXPECTED = {
+    "str | Sequence[str]": _NAMES,
+    "Sequence[str]": _NAMES,
+    "str | Path": _PATH,
+    "str": _TEXT,
+    "LoadedModel": "a model that `load` gave",
+    "Solution": "a solution of a run",
+}
+#: The annotations that are looked at.
+_KINDS = frozenset(kind + none for kind in _EXPECTED for none in ("", " | None"))
+_EXAMPLES = {
+    "outputs": '["inner.y"]',
+    "of": '["rms:inner.y"]',
+    "observables": '["peak_ball_force"]',
+    "wrt": '["bearing.clearance"]',
+    "method": '"auto"',
+    "compiler": '"gcc"',
+    "name": '"ball.force"',
+    "folder": '"generated/press"',
+    "path": '"results/press.nc"',
+    "model": 'load("generated/press")',
+    "solution": "model.simulate()",
+}
+
+
+def type_fault(name: str, annotation: str, value: Any) -> str | None:
+    """Why a value is none of what an annotation says; None where it is one, or the annotation is of another kind."""
+    kind = annotation.replace("collections.abc.", "")
+    optional = kind.removesuffix(" | None")
+    expected = _EXPECTED.get(optional)
+    if expected is None or (value is None and optional != kind) or _fits(expected, optional, value):
+        return None
+    example = f" Example: {name}={_EXAMPLES[name]}." if name in _EXAMPLES else ""
+    return f"{name}: {expected} is expected, not {value!r:.60} ({type(value).__name__}).{example}"
+
+
+def _fits(expected: str, kind: str, value: Any) -> bool:
+    if expected == _NAMES:
+        several = isinstance(value, Iterable) and not isinstance(value, bytes)
+        # an iterator is spent by looking into it
+        return several and (iter(value) is value or all(isinstance(item, str) for item in value))
+    if expected == _TEXT:
+        return isinstance(value, str)
+    if expected == _PATH:
+        return isinstance(value, str | os.PathLike)
+    return any(base.__name__ == kind for base in type(value).__mro__)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one real number, also as NumPy has them."""
+    return (isinstance(value, Real) and not isinstance(value, bool)) or getattr(value, "shape", None) == ()
+
+
+def typed(function: _Function) -> _Function:
+    """The function that first refuses arguments of a wrong type with a `RequestError`, as a decorator."""
+    kinds = {name: kind for name, kind in function.__annotations__.items() if name != "return" and kind in _KINDS}
+    if not kinds:
+        return function
+    arguments = inspect.signature(function)
+
+    @functools.wraps(function)
+    def checked(*given: Any, **named: Any) -> Any:
+        values = arguments.bind(*given, **named).arguments
+        faults = [type_fault(name, kind, values[name]) for name, kind in kinds.items() if name in values]
+        if any(faults):
+            raise RequestError("\n".join(filter(None, faults)))
+        return function(*given, **named)
+
+    return cast("_Function", checked)
+
+
+def typed_methods(cls: type[_Class]) -> type[_Class]:
+    """A class with `typed` around the public methods that it declares itself, as a decorator."""
+    for name, item in list(vars(cls).items()):
+        if inspect.isfunction(item) and (name == "__init__" or not name.startswith("_")):
+            setattr(cls, name, typed(item))
+    return cls
