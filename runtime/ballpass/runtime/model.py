@@ -533,6 +533,8 @@ class Model(PointModel, Questions):
         ------
         RequestError
             A wrong request: unknown names, columns of unequal length, values that are not finite numbers.
+        SimulationError
+            A cluster gave up; what it had finished is lost.
 
         Examples
         --------
