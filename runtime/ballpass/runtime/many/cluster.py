@@ -195,8 +195,8 @@ def run_tasks(
                 except (distributed.KilledWorker, distributed.CancelledError) as fault:
                     why = " ".join(str(fault).split()).rstrip(".")
                     raise SimulationError(
-                        f"Dask has given up a part of the work: {why}. {kept} Look at the logs of scheduler and workers; "
-                        "a worker that needs more memory than it has is ended by the system."
+                        f"Dask has given up a part of the work: {why}. {kept} Look at the logs of scheduler and "
+                        "workers; a worker that needs more memory than it has is ended by the system."
                     ) from fault
                 under_way.discard(future)
                 hand_out()
