@@ -27,6 +27,7 @@ from typer.testing import CliRunner, Result
 from ballpass.runtime import NoCompilerWarning, load_solution
 from ballpass.runtime import plot as figures
 from ballpass.runtime.app.cli import app
+from ballpass.runtime.contract.extras import WITHOUT_COMPILER
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "scenes"
@@ -519,6 +520,53 @@ def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
     # two methods at a relative tolerance of 1e-6 per step
     sampled = compiled["peak_ball_force"]["sampled"]["total"]  # between them only the stepper looks
     assert found["peak_ball_force"]["total"] == pytest.approx(sampled, rel=1e-4)
+
+
+def without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("compilers", "compile", "functions", "loaded_model"):
+        monkeypatch.setattr(f"ballpass.runtime.native.{module}.find_compiler", lambda command=None: None)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("life", "sensitivity", "steady", "trade", "sweep --vary bearing.clearance=1um:2um:2"),
+        *("run --of peak_ball_force", "run --error 1%", "run --turns settle", "run --method stepper"),
+    ],
+)
+def test_without_a_compiler_what_needs_one_is_refused_before_anything_is_derived(
+    ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    """`run --of` told to take a method that it had refused; the page said that everything runs."""
+    without_a_compiler(monkeypatch)
+    command, *rest = words.split()
+    says_no(
+        ballpass(tmp_path, command, SCENES / "varying_compliance.toml", *rest),
+        *("needs a C compiler", WITHOUT_COMPILER, 'pip install "ballpass[compiler]"'),
+    )
+    assert not (tmp_path / "generated").exists()
+
+
+@pytest.mark.filterwarnings("default::ballpass.runtime.NoCompilerWarning")
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("linearize", "jacobian --of ball.force --wrt bearing.clearance", "explain", "export --c"),
+        *("spectrum --of inner.y --cycles 25", "stream --cycles 1 --sample-rate 1kHz --out x.nc"),
+    ],
+)
+def test_without_a_compiler_the_rest_works(
+    ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    without_a_compiler(monkeypatch)
+    command, *rest = words.split()
+    result = ballpass(tmp_path, command, SCENES / "varying_compliance.toml", *rest)
+    assert result.exit_code == 0, result.stderr
+
+
+def test_the_page_on_installing_says_what_messages_say() -> None:
+    page = (SCENES.parent / "docs/howto/install.md").read_text(encoding="utf-8")
+    assert " ".join(WITHOUT_COMPILER.split()) in " ".join(page.split())
 
 
 @pytest.mark.parametrize(("setting", "option"), [("run.cycles=3", "--cycles 3"), ("run.rtol=1e-8", "--rtol 1e-8")])

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from ballpass.runtime import CacheWarning, CompileError, RequestError, load, loa
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.manifest import DIGEST, FILE_NAME, digest_of
 from ballpass.runtime.native import compile as compiling
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
@@ -123,6 +125,28 @@ def test_texts_that_are_no_manifest_are_refused(rotor: Path, text: str) -> None:
     (rotor / "manifest.json").write_bytes(text.encode("utf-8", "surrogatepass"))
     with pytest.raises(ArtefactError, match=r"manifest\.json"):
         load(rotor)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"title": "press\x1b]0;owned\x07"},
+        {"scene": "../../outside"},
+        {"files": [["../outside.c", "0" * 64]]},
+        {"files": [["..\\outside.c", "0" * 64]]},
+    ],
+    ids=str,
+)
+def test_a_manifest_with_escape_sequences_or_paths_is_refused(rotor: Path, change: dict[str, Any]) -> None:
+    """Also where its digest is right: whoever writes a folder can compute it."""
+    path = rotor / FILE_NAME
+    document = json.loads(path.read_text(encoding="utf-8")) | change
+    document.pop(DIGEST)
+    document[DIGEST] = digest_of(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(ArtefactError, match="load only folders you trust") as caught:
+        load(rotor)
+    assert str(caught.value).isprintable()
 
 
 def test_a_manifest_that_is_a_folder_or_a_path_that_is_none_is_refused(rotor: Path) -> None:

@@ -34,7 +34,7 @@ def wrap(function: QuantityFunction) -> Callable[[ArrayLike | Mapping[str, Array
 
     Derivatives are first ones, forward and reverse; ``function.certify`` checks them at a point.  An error of a run is
     a `BallpassError`; from within ``jit`` and ``vmap`` JAX wraps it in a ``jax.errors.JaxRuntimeError``, with its
-    message.
+    message, and an interrupt (Ctrl-C) as well.
 
     Raises
     ------

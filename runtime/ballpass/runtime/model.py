@@ -46,6 +46,9 @@ if TYPE_CHECKING:
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
     """Load a generated folder; compile its C when no cached library fits.
 
+    A generated folder is a program, which runs with your rights: load only folders you trust.  The digests of its
+    manifest show damage, not who wrote it.
+
     Parameters
     ----------
     folder : what `ballpass derive` wrote
@@ -530,6 +533,8 @@ class Model(PointModel, Questions):
         ------
         RequestError
             A wrong request: unknown names, columns of unequal length, values that are not finite numbers.
+        SimulationError
+            A cluster gave up; what it had finished is lost.
 
         Examples
         --------

@@ -168,6 +168,7 @@ def run(
     """Simulate a scene; write solution, summary and figures.
 
     Derives and compiles what is stale in generated/<scene>. Options not given are those of the scene's run table.
+    A generated folder may stand in place of the scene. It is a program: load only folders you trust.
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
@@ -187,7 +188,16 @@ def run(
         target = read_error(error, method, rtol)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
-        model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
+        needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
+        model = load_model(
+            scene,
+            stages,
+            method or asked.run.method,
+            kinks,
+            rtol,
+            overrides=asked.overrides,
+            needs=needs and f"ballpass run {needs}",
+        )
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,

@@ -24,6 +24,13 @@ EXTRAS = {
 #: What to do where a compiler is missing.
 INSTALL_COMPILER = 'Install gcc or clang, or a compiler from PyPI: `pip install "ballpass[compiler]"`'
 
+#: What works without a compiler, in messages and on the page about installing.
+WITHOUT_COMPILER = (
+    "Without a C compiler `run`, `stream`, `spectrum`, `animate`, `linearize`, `jacobian`, `explain` and `export --c` "
+    "work, in CasADi's virtual machine. `life`, `sensitivity`, `steady`, `sweep`, `trade`, `dataset`, `explore`, "
+    "`export --fmu`, and `run` with `--of`, `--error`, `--turns settle` or a method of the stepper, need one"
+)
+
 
 def need(module: str) -> Any:
     """A module of a package of `EXTRAS`.

@@ -13,7 +13,9 @@ import atexit
 import contextlib
 import hashlib
 import io
+import os
 import shutil
+import socket
 import tempfile
 import threading
 import zipfile
@@ -30,6 +32,7 @@ from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compile import compile_model
+from ballpass.runtime.native.compilers import need_compiler
 from ballpass.runtime.native.loaded_model import LoadedModel
 
 #: How long to wait for the first worker, and for a scheduler to answer [s].
@@ -102,6 +105,7 @@ class _Workshop:
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:
             archive.extractall(place)
+        need_compiler(f"The worker on {socket.gethostname()}, process {os.getpid()},")
         manifest = read_artefact(place)
         return LoadedModel(place, manifest, compile_model(place, manifest))
 
@@ -144,6 +148,7 @@ def run_tasks(
     models: Sequence[LoadedModel],
     function: Callable[..., Any],
     tasks: Callable[[Sequence[str]], Iterable[tuple[Any, ...]]],
+    kept: str,
 ) -> Iterator[Any]:
     """Results of `function` for the tasks, in the order in which they end; a few run at a time.
 
@@ -152,6 +157,7 @@ def run_tasks(
     models : that the function asks for with `loaded`
     function : of a module, so that workers find it
     tasks : arguments of the function, made of the keys of the models
+    kept : sentence about what becomes of finished work where Dask gives up
 
     Raises
     ------
@@ -187,9 +193,10 @@ def run_tasks(
                 try:
                     result = future.result()
                 except (distributed.KilledWorker, distributed.CancelledError) as fault:
+                    why = " ".join(str(fault).split()).rstrip(".")
                     raise SimulationError(
-                        f"Dask has given up a part of the work: {fault}. What was finished before is kept. Look at the "
-                        "logs of the workers; one that needs more memory than it has is ended by the system."
+                        f"Dask has given up a part of the work: {why}. {kept} Look at the logs of scheduler and "
+                        "workers; a worker that needs more memory than it has is ended by the system."
                     ) from fault
                 under_way.discard(future)
                 hand_out()

@@ -374,7 +374,9 @@ def _fill(
         here = dict(enumerate(models))
         results = ((first, make_signals(here, signals, seed, members(first))) for first in firsts)
     else:
-        results = run_tasks(client, models, _make_chunk, tasks)
+        results = run_tasks(
+            client, models, _make_chunk, tasks, "What was finished before is kept: a second call goes on."
+        )
     for first, chunk in results:
         write_samples(group, first, chunk)
         write_status(group, first, chunk)

@@ -23,6 +23,11 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 #: Parts of an ensemble for each thread of the cluster at least, as far as they fill a chunk; most members of a part.
 PARTS, MOST = 4, 4096
 
+#: What becomes of finished members where Dask gives up.
+LOST = (
+    "The members simulated before are lost: call simulate_many again, or make a data set, which goes on where it ended."
+)
+
 
 def simulate_parts(
     model: LoadedModel,
@@ -66,7 +71,7 @@ def simulate_parts(
             yield keys[0], first, part, names, options
 
     try:
-        for first, found in run_tasks(client, [model], _simulate_part, tasks):
+        for first, found in run_tasks(client, [model], _simulate_part, tasks, LOST):
             which = slice(first, min(first + size, count))
             left[which] = False
             if isinstance(found, RequestError):  # no member of the part can be simulated

@@ -33,7 +33,7 @@ import platformdirs
 
 from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
-from ballpass.runtime.contract.extras import INSTALL_COMPILER
+from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
@@ -101,7 +101,7 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
         warnings.warn(
             "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. "
             "Results are the same within the tolerance; a simulation takes some ten times as long, and extremes are "
-            f"those of samples. {INSTALL_COMPILER}.",
+            f"those of samples. {WITHOUT_COMPILER}. {INSTALL_COMPILER}.",
             NoCompilerWarning,
             stacklevel=3,
         )

@@ -22,6 +22,7 @@ from pathlib import Path
 from types import FrameType
 
 from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
 
 #: -O1: straight-line code runs as fast as with -O2 and compiles in half to a third of the time; the stepper's driver
 #: asks for more.  -ffp-contract=off: the same bits with and without fused multiply-add, so that results do not depend
@@ -87,6 +88,32 @@ def find_compiler(command: str | None = None) -> Compiler | None:
             identity=f"ziglang {importlib.metadata.version('ziglang')}",
         )
     return None
+
+
+def need_compiler(what: str, command: str | None = None) -> Compiler:
+    """The compiler to use, as `find_compiler`.
+
+    Parameters
+    ----------
+    what : what needs one, in words
+
+    Raises
+    ------
+    RequestError
+        There is none.
+    """
+    found = find_compiler(command)
+    if found is None:
+        raise RequestError(without_compiler(what))
+    return found
+
+
+def without_compiler(what: str) -> str:
+    """Message where there is no compiler, of what needs one."""
+    return (
+        f"{what} needs a C compiler, and none was found ($CC, cc, gcc, clang, ziglang). {WITHOUT_COMPILER}. "
+        f"{INSTALL_COMPILER}."
+    )
 
 
 @lru_cache(maxsize=16)

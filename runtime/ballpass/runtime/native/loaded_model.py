@@ -12,10 +12,9 @@ from typing import TypeVar
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
-from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.compilers import find_compiler
+from ballpass.runtime.native.compilers import find_compiler, without_compiler
 from ballpass.runtime.native.driver_library import (
     DIFFERENTIATING,
     DIFFERENTIATING_LOCATED,
@@ -161,9 +160,9 @@ class LoadedModel(CompiledFunctions):
 
     def _without_stepper(self) -> str:
         """What to say where the stepper is asked for and cannot be had."""
-        needs = "This needs the project's own stepper:"
         if not self.compiled:
-            return f"{needs} it is compiled, and no C compiler was found. {INSTALL_COMPILER}."
+            return without_compiler("The project's own stepper")
+        needs = "This needs the project's own stepper:"
         if self.manifest.unfit:
             return (
                 f"{needs} it does not take this scene: {self.manifest.unfit}. Run the model with method cvodes, for "

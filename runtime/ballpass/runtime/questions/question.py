@@ -37,6 +37,7 @@ class Question:
     check : of values of the options: RequestError where they contradict each other; the command does it before anything
         is derived
     runs : whether it integrates, so that the stepper is compiled first
+    samples : whether samples are enough, which other methods give without a compiler
     takes_runs : whether the solution of a run may stand in place of the model
     figures : of a model, an answer and overrides, by names of files
     always : whether figures are drawn into the folder of the results unless they are turned off; otherwise figures and
@@ -48,6 +49,7 @@ class Question:
     stage: str = "simulate"
     check: Callable[[Mapping[str, Any]], None] | None = None
     runs: bool = True
+    samples: bool = False
     takes_runs: bool = False
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
     always: bool = False

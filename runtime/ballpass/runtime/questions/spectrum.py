@@ -226,7 +226,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     yield "spectrum", figure
 
 
-@Question(stage="spectrum", check=_check, figures=_figures, always=True, takes_runs=True)
+@Question(stage="spectrum", samples=True, check=_check, figures=_figures, always=True, takes_runs=True)
 def spectrum(
     model: AnyModel,
     of: Of,

@@ -44,8 +44,10 @@ def dataset(
         from ballpass.runtime.contract.extras import need
         from ballpass.runtime.many.cluster import connected
         from ballpass.runtime.many.data_set import make_data_set
+        from ballpass.runtime.native.compilers import need_compiler
 
         need("zarr")
+        need_compiler("ballpass dataset")
         read = read_spec(spec)
         path = out if out is not None else Path("results") / f"{spec.stem}.zarr"
         check_folder(path.parent)

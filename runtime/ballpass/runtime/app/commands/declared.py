@@ -217,7 +217,8 @@ def _source(
         return load_solution(scene), {}
     asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
     method = (values.get("method") or asked.run.method) if question.runs else "none"
-    model = load_model(scene, stages, method, None, values.get("rtol"), overrides=asked.overrides)
+    needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
+    model = load_model(scene, stages, method, None, values.get("rtol"), overrides=asked.overrides, needs=needs)
     return model, asked.overrides
 
 

@@ -301,16 +301,23 @@ def load_model(
     rtol: float | None = None,
     *,
     overrides: Mapping[str, float],
+    needs: str = "",
 ) -> Model:
     """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take.
 
     Parameters
     ----------
     overrides : numbers of ``--set``; refused where the linkage locks with them
+    needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
+        derived; empty for others
     """
     from ballpass.runtime.contract.method_registry import STEPPERS
     from ballpass.runtime.model import load
+    from ballpass.runtime.native.compilers import need_compiler
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
+
+    if needs or method in STEPPERS:
+        need_compiler(needs or f"method {method}")
 
     def compiled(folder: Path) -> Model:
         stages("compile")

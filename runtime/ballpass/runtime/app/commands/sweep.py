@@ -131,7 +131,9 @@ def sweep(
         count = math.prod(len(one.values) for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
         with connected(scheduler, workers) as client:
-            model = load_model(scene, stages, method or usual, at_kinks, rtol, overrides=overrides)
+            model = load_model(
+                scene, stages, method or usual, at_kinks, rtol, overrides=overrides, needs="ballpass sweep"
+            )
             if model.states:
                 _ = model.ensemble_driver  # compiled here, where it is announced
             stages("simulate")
