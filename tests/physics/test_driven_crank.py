@@ -21,6 +21,7 @@ from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import IntegrationError, Model, Solution, load
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.driver_library import DRIVER
+from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -49,12 +50,13 @@ def test_andrews_squeezer_starts_with_the_published_accelerations(andrews: Model
     assert found == pytest.approx([BETA + THETA, 0.0, 0.0, 0.0], rel=1e-11, abs=1e-8)
 
 
-def test_a_driver_without_bearings_has_no_arrays_without_entries(andrews: Model) -> None:
+def test_a_driver_without_bearings_has_no_arrays_without_entries(andrews: Model, tmp_path: Path) -> None:
     """C knows none; nor does it say what a number is that is assigned twice in one expression."""
     if shutil.which("gcc") is None:
         pytest.skip("no gcc, whose warnings these are")
     warnings = [f"-Werror={name}" for name in ("array-bounds", "stringop-overflow", "sequence-point")]
-    places = [f"-I{place}" for place in (andrews.folder, DRIVER)]
+    (tmp_path / METHOD_TABLES).write_text(method_tables(), encoding="utf-8")
+    places = [f"-I{place}" for place in (andrews.folder, DRIVER, tmp_path)]
     command = ["gcc", "-std=c99", "-O2", "-fopenmp-simd", *warnings, *places, "-DBALLPASS_REDUCTIONS", "-S"]
     subprocess.run([*command, "-o", os.devnull, str(DRIVER / "stepper.c")], check=True)
 

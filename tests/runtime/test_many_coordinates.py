@@ -15,6 +15,7 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.native.compile import find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS
+from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
 
 #: Five coordinates with q'' = A q + B q' + sin t, in place of a generated model.
 HARNESS = """
@@ -101,7 +102,8 @@ def five(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactor
     folder = generate(scene_from_text(scene_text("varying_compliance"), "v"), place / "v")
     source, library = place / "harness.c", place / "harness.so"
     source.write_text(HARNESS)
-    options = [*FLAGS, "-std=c99", "-shared", "-fPIC", f"-I{DRIVER}", f"-I{folder}"]
+    (place / METHOD_TABLES).write_text(method_tables(), encoding="utf-8")
+    options = [*FLAGS, f"-I{place}", "-std=c99", "-shared", "-fPIC", f"-I{DRIVER}", f"-I{folder}"]
     subprocess.run([*compiler.command, *options, str(source), "-o", str(library), "-lm"], check=True)
     return ctypes.CDLL(str(library))
 

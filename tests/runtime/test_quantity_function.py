@@ -110,9 +110,10 @@ def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFun
     table[2, 0] = np.nan
     for call, own in (("__call__", function(rows[:1])), ("jacobian", function.jacobian(rows[:1]))):
         lenient = QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan")
-        with pytest.warns(UnknownValueWarning, match=r"slider\.mass: allowed is a number above 0") as caught:
+        with pytest.warns(UnknownValueWarning) as caught:
             mine = getattr(lenient, call)(table)
         assert {name for name in OF if any(name in str(item.message) for item in caught)} == set(OF)
+        assert any("clearance = nan" in str(item.message) for item in caught)
         assert np.array_equal(mine[:1], own)
         assert np.isnan(mine[1:]).all()
         getattr(lenient, call)(table)  # a warning would be an error: it is said once

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -110,9 +110,13 @@ def rms_of(mean: Array, std: Array) -> Array:
 
 def reduction_rows(manifest: Manifest) -> ReductionRows:
     """Layout of the rows of a model."""
-    prefixes = [bearing.prefix for bearing in manifest.bearings]
+    return _rows(tuple(state.name for state in manifest.states), tuple(one.prefix for one in manifest.bearings))
+
+
+@lru_cache(maxsize=64)
+def _rows(states: tuple[str, ...], prefixes: tuple[str, ...]) -> ReductionRows:
     return ReductionRows(
-        states=tuple(state.name for state in manifest.states),
+        states=states,
         balls=tuple(prefix + name for prefix in prefixes for name in BALL_CHANNELS),
         powers=tuple(prefix + name for prefix in prefixes for name in LOAD_POWERS),
     )
