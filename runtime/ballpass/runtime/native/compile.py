@@ -103,7 +103,7 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
             "Results are the same within the tolerance; a simulation takes some ten times as long, and extremes are "
             f"those of samples. {WITHOUT_COMPILER}. {INSTALL_COMPILER}.",
             NoCompilerWarning,
-            stacklevel=3,
+            stacklevel=4,  # the caller of `load`, which is checked
         )
         return None
     place = Path(folder).absolute()
