@@ -39,7 +39,7 @@ EACH = """
 from typer.main import get_command
 from typer.testing import CliRunner
 from ballpass.runtime.app.cli import app
-needed = {"of": "q", "out": "o", "sample_rate": "1 kHz", "vary": "a=1:2:3", "wrt": "p"}
+needed = {"of": "q", "out": "o", "sample_rate": "1 kHz", "vary": "a=1:2:3", "wrt": "p", "minimize": "q"}
 for name, command in get_command(app).commands.items():
     options = [w for p in command.params if p.required and p.name in needed for w in (p.opts[0], needed[p.name])]
     options += [] if name == "bearings" else ["rotor.toml" if name != "new" else "rotor"]
@@ -114,7 +114,8 @@ def test_a_generated_folder_runs_where_derive_sympy_pint_and_figures_are_missing
     assert each.returncode == 0, each.stderr
     ends = {name: (code, said) for name, code, said in map(str.split, each.stdout.splitlines())}
     assert ends.pop("dataset")[0] == "2"  # Zarr comes first
-    assert ends.pop("spectrum")[0] == "2"  # SciPy does
+    for name in ("spectrum", "bifurcation", "optimize"):
+        assert ends.pop(name)[0] == "2"  # SciPy does
     assert len(ends) > 12
     assert set(ends.values()) == {("2", "True")}, ends
 

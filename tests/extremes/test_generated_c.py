@@ -60,7 +60,8 @@ def test_no_warnings(folder: Path, tmp_path: Path) -> None:
     for source in (*sorted(DRIVER.glob("*.c")), folder / "model.c"):
         for define in ("", "BALLPASS_SENSITIVITIES", "BALLPASS_REDUCTIONS") if source.name == "stepper.c" else ("",):
             defined = [f"-D{define}"] if define else []
-            command = ("gcc", "-fsyntax-only", *flags, *defined, f"-I{folder}", f"-I{DRIVER}", f"-I{tmp_path}", str(source))
+            places = [f"-I{place}" for place in (folder, DRIVER, tmp_path)]
+            command = ("gcc", "-fsyntax-only", *flags, *defined, *places, str(source))
             said += subprocess.run(command, capture_output=True, text=True, check=False, timeout=300).stderr
     assert not [line for line in said.splitlines() if "warning:" in line or "error:" in line]
 

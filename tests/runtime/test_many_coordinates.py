@@ -58,24 +58,24 @@ static void bp_linearize(const bp_numbers *n, const double *w, const double *wt,
     for (int k = 0; k < 5; k++) at[k] = wt[0];
 }
 #include "single.h"
-static void explicit_run(const bp_explicit_method *method, int stages, bp_numbers n, double *x, double h, int steps)
+static void explicit_run(const bp_explicit_method *method, bp_numbers n, double *x, double h, int steps)
 {
     double weight[10] = {0}, next[10];
     bp_explicit work;
     for (int i = 0; i < steps; i++) {
         bp_explicit_rate(&n, i * h, x, work.k[0]);
-        bp_explicit_step(method, stages, &work, &n, i * h, x, h, 0, weight, next);
+        bp_explicit_step(method, &work, &n, i * h, x, h, 0, weight, next);
         for (int k = 0; k < 10; k++) x[k] = next[k];
     }
 }
-static void linear_run(const bp_rosenbrock_method *method, int stages, bp_numbers n, double *x, double h, int steps)
+static void linear_run(const bp_rosenbrock_method *method, bp_numbers n, double *x, double h, int steps)
 {
     double weight[10] = {0}, next[10];
     bp_linear work;
     bp_matrix matrix;
     for (int i = 0; i < steps; i++) {
         bp_linear_start(&work, &n, i * h, x, 1);
-        bp_rosenbrock_step(method, stages, &work, &matrix, &n, i * h, x, h, weight, next);
+        bp_rosenbrock_step(method, &work, &matrix, &n, i * h, x, h, weight, next);
         for (int k = 0; k < 10; k++) x[k] = next[k];
     }
 }
@@ -83,7 +83,7 @@ static void linear_run(const bp_rosenbrock_method *method, int stages, bp_number
     void name(const double *p, const double *c, double *x, double h, int steps) \\
     { \\
         const bp_numbers n = {0, p, c}; \\
-        run(&bp_##name, bp_##name.stages, n, x, h, steps); \\
+        run(&bp_##name, n, x, h, steps); \\
     }
 """
 HARNESS += "".join(

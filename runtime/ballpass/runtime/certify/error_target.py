@@ -227,8 +227,7 @@ def _relative(one: EvaluatedQuantities, other: EvaluatedQuantities, least: float
         found = np.abs(one.values - other.values) / np.abs(other.values)
     rounding = np.finfo(float).eps
     found = np.where(np.isfinite(found), np.maximum(found, max(least, rounding)), np.inf)
-    zero = (one.values == 0.0) & (other.values == 0.0)
-    return np.where(zero, rounding, found).tolist()  # type: ignore[no-any-return]
+    return np.where(one.values == other.values, rounding, found).tolist()  # type: ignore[no-any-return]
 
 
 def _chaos(found: Accuracy) -> str:

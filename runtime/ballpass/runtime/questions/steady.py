@@ -326,6 +326,7 @@ def steady(
         why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
         raise RequestError(f"steady: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
     refuse_jumps(manifest, "steady")
+    _ = model.stepper  # refused here where a scene has none
     ends = None if over is None else parameter_range(manifest, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)
