@@ -29,7 +29,7 @@ Pair = tuple[sp.Expr, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ball:
+class BallRelations:
     """The generic ball j at the angle ``cage_angle + 2 pi (j - 1) / count``.
 
     Attributes
@@ -69,7 +69,7 @@ class BearingModel:
     names: Names
     constants: tuple[Definition, ...]
     coordinates: tuple[Coordinate, ...]
-    ball: Ball
+    ball: BallRelations
     gradient: tuple[sp.Expr, ...]  # of a ball's deflection along the coordinates
     laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
 
@@ -133,7 +133,7 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
 
 def _ball(
     bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage: Cage
-) -> tuple[Ball, list[sp.Expr], list[sp.Expr]]:
+) -> tuple[BallRelations, list[sp.Expr], list[sp.Expr]]:
     """The generic ball, d(delta_j)/d(coordinate) for each coordinate, and the parts of its force."""
     cos, sin, speed = names.variable("ball.cos"), names.variable("ball.sin"), cage.rate
     motion = {c.position: sp.Function(c.name)(TIME) for c in coordinates}
@@ -196,7 +196,7 @@ def _ball(
         )
         for axis, along in (("x", cos), ("y", sin))
     )
-    ball = Ball(
+    ball = BallRelations(
         count=bearing.balls,
         cage_angle=cage.angle,
         cage_speed=speed,
