@@ -14,6 +14,7 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.native.compile import find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS
+from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
 
 #: The driver's factorization and what it makes of a right-hand side, as it uses them in a stage.
 HARNESS = """
@@ -48,7 +49,8 @@ def solve(
     )
     source, library = folder.parent / "harness.c", folder.parent / "harness.so"
     source.write_text(HARNESS)
-    include = [f"-I{DRIVER}", f"-I{folder}"]
+    (folder.parent / METHOD_TABLES).write_text(method_tables(), encoding="utf-8")
+    include = [f"-I{place}" for place in (DRIVER, folder, folder.parent)]
     command = [
         *compiler.command,
         *FLAGS,
