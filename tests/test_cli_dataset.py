@@ -102,6 +102,7 @@ def test_faults_of_a_specification_are_told_with_their_place(tmp_path: Path, old
     assert "title (line 1)" in words  # with what else is wrong
 
 
+@pytest.mark.long
 def test_a_copy_of_a_specification_goes_on_and_another_seed_is_named_alone(tmp_path: Path) -> None:
     """The name of the file was compared as if it were the scene's content."""
     text = SPEC.replace('title = "Tight and loose"\n', "").replace("members = 40", "members = 2")

@@ -220,6 +220,7 @@ def test_lanes_and_single_runs_agree(rotor: Model) -> None:
             assert many[name][k] == one[name][0]
 
 
+@pytest.mark.long
 def test_sensitivities_are_verified(make_model: Callable[..., Model]) -> None:
     """Derivatives of a damped roller bearing, verified by the second route."""
     model = make_model("varying_compliance", *ROLLER, TANGENT)

@@ -82,6 +82,7 @@ def summed(model: Model, parameters: dict[str, float]) -> dict[str, float]:
     return found | {"P": mean(force**3) ** (1 / 3), "speed": float(np.sum(turned)) / END}
 
 
+@pytest.mark.long
 def test_lives_of_random_tables_are_sums_over_passes(press: Model) -> None:
     """20 tables of speed and load; the sums take samples and have no quadrature, no place that is a hat function."""
     rng = np.random.default_rng(20261123)

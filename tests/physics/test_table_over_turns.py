@@ -40,6 +40,7 @@ def test_two_equal_turns_are_one_and_others_differ(make_virtual: Callable[..., M
     assert np.max(np.abs(c[second])) < 0.5 * np.max(np.abs(a[second]))
 
 
+@pytest.mark.long
 def test_derivatives_of_a_cycle_of_two_turns_are_verified(make_model: Callable[..., Model]) -> None:
     both = [*ANGLES, *(angle + 360.0 for angle in ANGLES)]
     model = make_model("punching_press", *table(both, [*FORCES, 0.0, 300.0, 900.0, 0.0], ", turns = 2"))

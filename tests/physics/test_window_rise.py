@@ -36,6 +36,7 @@ def test_a_rise_is_a_table_with_four_knots(make_virtual: Callable[..., Model], s
             assert one[name] == pytest.approx(other[name], rel=0, abs=1e-5 * size)
 
 
+@pytest.mark.long
 def test_derivatives_by_the_rise_are_verified_over_turns(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press", RISE)
     names = [f"{PATH}.rise", f"{PATH}.start", f"{PATH}.end", "mechanism.driver.speed"]

@@ -309,6 +309,7 @@ def begun(folder: Path, *words: object, cwd: Path) -> Iterator[subprocess.Popen[
         yield process
 
 
+@pytest.mark.long
 def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
     scene: Path, tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
 ) -> None:
@@ -638,7 +639,12 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.parametrize(
-    "words", [("run", "--out"), ("derive", "--out"), ("export", "--c", "--out")], ids=lambda words: words[0]
+    "words",
+    [
+        ("run", "--out"),
+        *(pytest.param(w, marks=pytest.mark.long) for w in (("derive", "--out"), ("export", "--c", "--out"))),
+    ],
+    ids=lambda words: words[0],
 )
 def test_a_read_only_folder_is_told_with_a_remedy(
     scene: Path, tmp_path: Path, read_only: Path, words: tuple[str, ...]

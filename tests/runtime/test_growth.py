@@ -22,6 +22,7 @@ PRESS = SCENES / "punching_press_tangent.toml"
 WIDE = {CLEARANCE: 60e-6}
 
 
+@pytest.mark.long
 def test_chaos_is_said_at_every_tolerance(press: Model) -> None:
     """Tangent press, 60 um, 12 turns: the lowest inner.x is -56, -60, -61 um at rtol 1e-6, 1e-8, 1e-10."""
     lowest = [press.reduce(12, parameters=WIDE, rtol=one)["inner.x"].minimum for one in (1e-6, 1e-8, 1e-10)]

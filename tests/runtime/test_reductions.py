@@ -34,7 +34,7 @@ def one_library(monkeypatch: pytest.MonkeyPatch) -> Callable[[Model], Model]:
 
 
 @pytest.mark.parametrize("method", ["stepper-dp54", "stepper-dop853", "stepper-rodas4", "stepper-rodas5p"])
-@pytest.mark.parametrize("law", ["one-sided", "one-sided-gated"])
+@pytest.mark.parametrize("law", ["one-sided", pytest.param("one-sided-gated", marks=pytest.mark.long)])
 def test_reductions_equal_those_of_fifty_thousand_samples_a_cycle(
     make_model: ModelMaker, one_library: Callable[[Model], Model], law: str, method: str
 ) -> None:

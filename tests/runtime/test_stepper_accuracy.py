@@ -174,6 +174,7 @@ def test_every_family_converges_to_the_motion_cvodes_finds(
     assert middle[-1] < middle[0] / 500, middle
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", STEPPERS)
 def test_without_kinks_errors_fall_with_the_tolerance(make_model: Make, method: str) -> None:
     """The press under the tangent law, contact onset smoothed over 2 um: what held the order down was the kink."""
