@@ -278,7 +278,9 @@ def test_runs_with_stiff_contacts_tend_to_the_reactions_of_ideal_joints(tmp_path
     errors = []
     for decades in range(5):
         run = {"times": times, "transient": 0, "method": "stepper-rodas5p", "rtol": 1e-8, "outputs": names}
-        solution = model.simulate(duration=0.1, parameters=stiffer(machine, decades), **run)
+        # concentric: at rest under the load of t = 0 soft contacts start elsewhere than stiff ones
+        start = np.zeros(len(model.states))
+        solution = model.simulate(duration=0.1, parameters=stiffer(machine, decades), initial=start, **run)
         found = np.array([solution[name] for name in names]).T
         errors.append(float(np.max(np.abs(found - ideal)) / np.max(np.abs(ideal))))
     assert all(after < 0.4 * before for before, after in pairwise(errors))

@@ -35,7 +35,8 @@ def test_a_healthy_machine_has_no_line_of_a_damaged_bearing(make_model: Callable
         for orders in (False, True):
             found = model.spectrum(channel, orders=orders, **run)
             assert not [name for name in found.names if DAMAGED.search(name)], (turns, orders)
-            assert found.names[0] in {"shaft", "BPFO"} or scene == "varying_compliance"
+            # a motor's speed changes within the turn, and its lines lie between the multiples of the mean
+            assert found.names[0] in {"shaft", "BPFO"} or scene in ("varying_compliance", "punching_press_motor")
 
 
 def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make_model: Callable[..., Model]) -> None:

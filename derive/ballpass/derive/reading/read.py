@@ -220,7 +220,9 @@ def _read(root: Table, name: str) -> Scene:
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
         run, outputs = _read_run(root.table("run", required=False))
-        seated = "transient_cycles" not in root.data.get("run", {}) and not any(_states_start(root))
+        stated = root.data.get("run", {})
+        transient = isinstance(stated, dict) and "transient_cycles" in stated
+        seated = not transient and not any(_states_start(root))
         scene = Scene(
             name=name,
             title=title,
