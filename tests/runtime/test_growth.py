@@ -87,7 +87,7 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     assert "amplifies small errors" in said
     (row,) = [line for line in shown.splitlines() if line.strip().startswith("Inner ring, x")]
     assert row.count("±") == 3
-    (force,) = [line for line in shown.splitlines() if "Torque of the drive" in line]
+    (force,) = [line for line in shown.splitlines() if line.strip().startswith("Torque of the")]
     assert "±" not in force
     code, shown, said = ballpass("run", PRESS, "--no-figures")
     assert (code, "amplifies" in said, "±" in shown) == (0, False, False)
