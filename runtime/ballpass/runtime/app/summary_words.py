@@ -64,8 +64,8 @@ def row_words(manifest: Manifest, name: str) -> str:
         return f"{_ADDED[own].replace('ball', noun)}{',' + whose.removeprefix(' of') if whose else ''}"
     infos = (*manifest.states, *manifest.outputs)
     found = next((info.description for info in infos if info.name == name), "")
-    paths = {f"{bearing.prefix}{key}": f"{bearing.path}.{key}" for bearing in manifest.bearings for key in (own,)}
-    found = found or next((info.description for info in manifest.constants if info.name == paths.get(name)), name)
+    paths = {f"{bearing.path}.{own}" for bearing in manifest.bearings if bearing.prefix == prefix}
+    found = found or next((info.description for info in manifest.constants if info.name in paths), name)
     for pattern, short in _SHORTER:
         found = re.sub(pattern, short, found)
     found = found[:1].upper() + found[1:]
