@@ -87,6 +87,7 @@ def test_a_specification_is_read_in_si_with_changes_of_its_scene(tmp_path: Path)
         ("members = 60", "member = 60", 'classes.loose.member (line 24): unknown key'),
         ("balls = 9", "balls = 1", "classes.stiff (line 19): its scene:"),
         ('"50 ms"', '"0 ms"', "duration (line 7): 0.0 was given"),
+        ("[parameters]", "[sensor]\nresonance = 8\n[parameters]", "sensor.resonance (line 13): "),
         ('"10 deg"', '"10 kg"', "parameters.bearing.ball_angle (line 14): the unit"),
     ],
 )  # fmt: skip

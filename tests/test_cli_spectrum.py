@@ -115,3 +115,19 @@ def test_wrong_requests_are_refused_with_words(
     done = ballpass("spectrum", signal, "--no-figures", *words)
     assert done.exit_code == 2
     assert message in done.stderr.replace("\n", " ")
+
+
+def test_a_sensor_and_a_chosen_band_are_said(ballpass: Callable[..., Result], signal: Path) -> None:
+    words = ("spectrum", signal, "--of", "inner.ay", "--transient", "20", "--no-figures")
+    plain, sensed = (
+        json.loads(ballpass(*words, *more, "--json").stdout) for more in ((), ("--sensor", "low_pass=30 Hz"))
+    )
+    assert sensed["lines"][0]["amplitude"] < 0.1 * plain["lines"][0]["amplitude"]
+    done = ballpass(*words, "--kurtogram")
+    assert done.exit_code == 0, done.output
+    assert "chosen by its kurtosis" in done.stdout
+    refused = ballpass(*words, "--kurtogram", "--envelope", "2kHz:8kHz")
+    assert refused.exit_code == 2
+    assert "Omit one of the two" in refused.stderr
+    refused = ballpass(*words, "--sensor", "resonance=8")
+    assert (refused.exit_code, "--sensor: resonance: " in refused.stderr) == (2, True)

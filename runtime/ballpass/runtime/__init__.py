@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.integration_error import IntegrationError
     from ballpass.runtime.run.reductions import Reduction, Reductions
     from ballpass.runtime.run.sensitivity import Sensitivities
+    from ballpass.runtime.run.sensor import Sensor
     from ballpass.runtime.run.solution import Solution, Statistics
     from ballpass.runtime.run.solution_file import load_solution
     from ballpass.runtime.run.start import RunEnd
@@ -77,6 +78,7 @@ __all__ = [
     "RunEnd",
     "Sensitivities",
     "SensitivityReport",
+    "Sensor",
     "SignalClass",
     "Signals",
     "SimulationError",
@@ -136,6 +138,7 @@ _HOME = {
     "Reduction": "run.reductions",
     "Reductions": "run.reductions",
     "Sensitivities": "run.sensitivity",
+    "Sensor": "run.sensor",
     "Solution": "run.solution",
     "Statistics": "run.solution",
     "load_solution": "run.solution_file",

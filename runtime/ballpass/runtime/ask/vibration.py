@@ -5,6 +5,7 @@ In: samples at equal steps.  Out: arrays and small frozen records.  SciPy does t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,10 @@ Array = NDArray[np.float64]
 BAND_ORDER = 4
 #: Samples of a turn where orders are asked for, at most so many times those of a mean turn.
 MOST_FINER = 8
+#: Lines in a band of a kurtogram at least: kurtosis of fewer scatters by more than impacts raise it.
+LEAST_LINES = 128
+#: Part of a record at each end that a kurtogram fades out and leaves out.
+ENDS = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +115,73 @@ def envelope(t: ArrayLike, signal: ArrayLike, band: tuple[float, float]) -> Arra
 
     stages = signals.butter(BAND_ORDER, [low, high], "bandpass", fs=rate, output="sos")
     return np.asarray(np.abs(signals.hilbert(signals.sosfiltfilt(stages, values))), dtype=float)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BandKurtosis:
+    """Kurtosis of a signal within a band.
+
+    Attributes
+    ----------
+    low, high : edges [Hz]
+    kurtosis : of the complex envelope, 0 for stationary Gaussian noise, -1 for a sine, more for impacts [1]
+    """
+
+    low: float
+    high: float
+    kurtosis: float
+
+
+def kurtogram(t: ArrayLike, signal: ArrayLike, narrowest: float) -> tuple[BandKurtosis, ...]:
+    """Kurtosis within bands of many widths, the highest first: impacts ring in the first band.
+
+    Widths are halves and thirds of half the sampling rate, and halves of these; bands overlap by half.
+
+    Parameters
+    ----------
+    t : (n,) times at equal steps [s]
+    signal : (n,) samples [any unit]
+    narrowest : width of the narrowest bands [Hz]; wide enough that impacts stay apart in it: some times their rate
+
+    Raises
+    ------
+    RequestError
+        Steps are not equal, the signal does not change, or no band is as wide.
+
+    References
+    ----------
+    Antoni, J.: Fast computation of the kurtogram for the detection of transient faults. Mech. Syst. Signal Process. 21
+    (2007) 108-124, doi:10.1016/j.ymssp.2005.12.002.  Its bands come from a filter bank, these from the lines of one
+    Fourier transform, weighted with a Hann window over each band.
+    """
+    time, values = even_samples(t, signal)
+    rate = (time.size - 1) / (time[-1] - time[0])
+    diagnosis(values)  # refuses a signal that does not change
+    signals = need("scipy.signal")  # here: the import takes longer than a run
+
+    # ends that do not meet would ring in every band
+    lines = np.fft.rfft((values - np.mean(values)) * signals.windows.tukey(values.size, 2.0 * ENDS))
+    highest = rate / 2.0
+    widths = sorted({highest / (parts << k) for parts in (2, 3) for k in range(30)}, reverse=True)
+    found = []
+    for width in (width for width in widths if width >= narrowest):
+        count = int(width / rate * values.size)
+        if count < LEAST_LINES:
+            break
+        taper = signals.windows.hann(count, sym=False)
+        for k in range(1, round(2.0 * highest / width) - 2):
+            first = round(k * width / 2.0 / rate * values.size)
+            power = np.abs(np.fft.ifft(lines[first : first + count] * taper)) ** 2
+            inner = power[math.ceil(ENDS * count) : math.floor((1.0 - ENDS) * count)]
+            kurtosis = float(np.mean(inner**2) / np.mean(inner) ** 2) - 2.0
+            low = k * width / 2.0
+            found.append(BandKurtosis(low=low, high=low + width, kurtosis=kurtosis))
+    if not found:
+        raise RequestError(
+            f"narrowest is {narrowest:g} Hz; allowed: up to {widths[0]:g} Hz, a quarter of the sampling rate, in a "
+            f"record of more than {LEAST_LINES} lines of that band; sample the run faster or longer"
+        )
+    return tuple(sorted(found, key=lambda band: -band.kurtosis))
 
 
 def over_angle(angle: ArrayLike, signal: ArrayLike, per_turn: int | None = None) -> tuple[Array, Array]:

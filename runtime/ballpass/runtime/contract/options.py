@@ -34,6 +34,7 @@ class Option:
     unit : of a quantity, which the command line takes as text with a unit; empty for other options
     least, above, most : bounds of a number
     choices : allowed words; empty for any
+    reader : of a record, which the command line takes as text
     """
 
     words: str
@@ -45,6 +46,7 @@ class Option:
     above: float = -math.inf
     most: float = math.inf
     choices: tuple[str, ...] = ()
+    reader: Callable[[str], Any] | None = None
 
     def flag(self, name: str) -> str:
         """Flag of a parameter on the command line."""

@@ -26,6 +26,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.sensor import Sensor
 from ballpass.runtime.run.simulate import simulate
 
 #: Ways to store samples.
@@ -48,6 +49,7 @@ class Signals:
     precision : of stored samples, "float32" or "float64"
     quantities : names of quantities of the recorded part of each run, which are stored as labels ("peak_ball_force");
         see `Model.quantities`
+    sensor : what stands between the machine and the recorder; None records the outputs themselves
 
     Raises
     ------
@@ -69,6 +71,7 @@ class Signals:
     rtol: float | None = None
     precision: str = "float32"
     quantities: tuple[str, ...] = ()
+    sensor: Sensor | None = None
 
     def __post_init__(self) -> None:
         least, most = TOLERANCES
@@ -99,6 +102,24 @@ class Signals:
     def times(self) -> np.ndarray:
         """Times of the samples in the runs, shape (samples,) [s]."""
         return self.transient + np.arange(self.samples) / self.sample_rate
+
+    @property
+    def every(self) -> int:
+        """Samples of the run to each that is recorded: what a sensor filters is sampled more finely."""
+        return 1 if self.sensor is None else max(1, math.ceil(self.sensor.rate / self.sample_rate))
+
+    @property
+    def before(self) -> int:
+        """Samples of the run in front of the first that is recorded, which a sensor remembers."""
+        if self.sensor is None:
+            return 0
+        return math.floor(min(self.sensor.memory, self.transient) * self.sample_rate * self.every)
+
+    @property
+    def run_times(self) -> np.ndarray:
+        """Times of the samples of the runs [s]; `times` where there is no sensor."""
+        count = self.before + (self.samples - 1) * self.every + 1
+        return self.transient + (np.arange(count) - self.before) / (self.sample_rate * self.every)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +170,8 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
     noise_rms = np.zeros((len(members), len(signals.outputs)))
     quantities = np.full((len(members), len(signals.quantities)), np.nan)
     failures = []
-    times = signals.times
+    times = signals.run_times
+    rate = signals.sample_rate * signals.every
     for row, member in enumerate(members):
         model = models[member.kind]
         try:
@@ -165,6 +187,8 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
         random = stream(seed, member.kind, member.place, NOISE)
         for k, name in enumerate(signals.outputs):
             signal = found[name]
+            if signals.sensor is not None:
+                signal = signals.sensor.measured(signal, rate, random, signals.every, signals.before)
             if member.snr is not None:
                 noise_rms[row, k] = np.std(signal) * 10.0 ** (-member.snr / 20.0)
                 signal = signal + noise_rms[row, k] * random.standard_normal(len(signal))

@@ -16,6 +16,7 @@ from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Tr
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.run.sensor import Sensor, sensor_of_text
 from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from ballpass.runtime.quantity.characteristic import CharacteristicLine, LineName
     from ballpass.runtime.run.solution import Solution
 
+#: Bands of a kurtogram are so many times as wide as the fastest line at least: impacts stay apart in them.
+WIDTHS = 3.0
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
@@ -43,6 +46,19 @@ Of = Annotated[str, Option(words="Output or state of the scene with one value: `
 Band = Annotated[
     tuple[float, float] | None,
     Option(words="The envelope of this band instead of the signal.", example="2kHz:8kHz", shown="LOW:HIGH", unit="Hz"),
+]
+Kurtogram = Annotated[
+    bool,
+    Option(words="The envelope of the band with the highest kurtosis, in which impacts ring.", flags=("--kurtogram",)),
+]
+ThroughSensor = Annotated[
+    Sensor | None,
+    Option(
+        words="What a sensor makes of the output, its mounting, filter, noise and bits.",
+        example='"resonance=8 kHz, low_pass=10 kHz"',
+        shown="SENSOR",
+        reader=sensor_of_text,
+    ),
 ]
 Orders = Annotated[
     bool, Option(words="Over multiples of the shaft's speed, also where that changes.", flags=("--orders",))
@@ -72,6 +88,7 @@ class SignalSpectrum(ShortRepr, Reported):
     ----------
     of, unit : the signal
     envelope : band whose envelope was taken [Hz], None for the signal itself
+    kurtosis : of the band that the kurtogram chose, 0 for noise; None without one [1]
     orders : whether positions are multiples of the shaft's speed instead of frequencies
     spectrogram : whether the figure is one over time
     window, scaling : of the spectrum
@@ -94,6 +111,7 @@ class SignalSpectrum(ShortRepr, Reported):
     of: str
     unit: str
     envelope: tuple[float, float] | None
+    kurtosis: float | None
     orders: bool
     spectrogram: bool
     window: str
@@ -165,12 +183,16 @@ class SignalSpectrum(ShortRepr, Reported):
             f"rms {s.rms:.4g} {self.unit}, peak {s.peak:.4g} {self.unit}, crest factor {s.crest_factor:.3g}, kurtosis "
             f"{s.kurtosis:.3g}, skewness {s.skewness:.3g}"
         )
+        if self.envelope is not None and self.kurtosis is not None:
+            low, high = self.envelope
+            said.append(f"envelope of {low:.5g} to {high:.5g} Hz, chosen by its kurtosis of {self.kurtosis:.3g}")
         facts = {
             "of": self.of,
             "unit": self.unit,
             "window": self.window,
             "scaling": self.scaling,
             "envelope": self.envelope,
+            "kurtosis": self.kurtosis,
             "resolution": self.resolution,
             "statistics": asdict(s),
             "characteristic": [asdict(mark) for mark in self.marks],
@@ -182,6 +204,8 @@ class SignalSpectrum(ShortRepr, Reported):
 
 def _check(values: Mapping[str, Any]) -> None:
     need("scipy")
+    if values["kurtogram"] and values["envelope"] is not None:
+        raise RequestError("--kurtogram chooses the band, and --envelope was given as well. Omit one of the two.")
     if values["orders"] and values["scaling"] != "amplitude":
         raise RequestError("--orders gives amplitudes, and --scaling was given as well. Omit one of the two.")
     if values["orders"] and values["spectrogram"]:
@@ -232,6 +256,8 @@ def spectrum(
     of: Of,
     *,
     envelope: Band = None,
+    kurtogram: Kurtogram = False,
+    sensor: ThroughSensor = None,
     orders: Orders = False,
     spectrogram: AsMap = False,
     window: Window = "hann",
@@ -271,6 +297,7 @@ def spectrum(
     from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
     from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
     from ballpass.runtime.ask.vibration import envelope as envelope_of
+    from ballpass.runtime.ask.vibration import kurtogram as kurtogram_of
     from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines
     from ballpass.runtime.run.solution import Solution
 
@@ -284,21 +311,31 @@ def spectrum(
         warnings = _too_slow(run)
     else:
         states, warnings = [info.name for info in model.manifest.states], ()
-        finest = _scene_rate(model.manifest, model.numbers(parameters).values)
+        scene_rate = _scene_rate(model.manifest, model.numbers(parameters).values)
+        finest = scene_rate if sensor is None else max(scene_rate, sensor.rate)
+        wanted = finest if sample_rate is None and finest > scene_rate else sample_rate
         run = model.simulate(
             cycles=_turns(model, parameters, transient) if cycles is None and duration is None else cycles,
             duration=duration,
             transient=transient,
             parameters=parameters,
             rtol=rtol,
-            sample_rate=None if sample_rate is None else sample_rate * max(1, math.ceil(finest / sample_rate)),
+            sample_rate=None if wanted is None else wanted * max(1, math.ceil(finest / wanted)),
             outputs=[] if of in states and of not in model.outputs else [of],
             progress=progress,
         )
+    if run[of].ndim != 1:
+        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
+    if sensor is not None:
+        run = replace(run, outputs={**run.outputs, of: _measured(run, of, sensor)})
     solution = run.steady()
     signal = solution[of]
-    if signal.ndim != 1:
-        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
+    numbers = {**solution.parameters, **solution.constants}
+    kurtosis = None
+    if kurtogram:
+        fastest = max((mark.frequency for mark in characteristic_lines(solution.manifest, numbers)), default=0.0)
+        best = kurtogram_of(solution.t, signal, WIDTHS * fastest)[0]
+        envelope, kurtosis = (best.low, best.high), best.kurtosis
     values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
     time, even = solution.t[:-1], values[:-1]  # the end of a whole number of turns is their start again
     unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
@@ -317,7 +354,6 @@ def spectrum(
     if sample_rate is not None and not orders:
         within = position <= 0.5 * sample_rate * (1.0 + 1e-9)
         position, height = position[within], height[within]
-    numbers = {**solution.parameters, **solution.constants}
     marks = characteristic_lines(solution.manifest, numbers, orders=orders)
     if not carries_lines(solution.manifest, of):
         marks = tuple(mark for mark in marks if mark.name == "shaft")
@@ -326,6 +362,7 @@ def spectrum(
         of=of,
         unit=unit,
         envelope=envelope,
+        kurtosis=kurtosis,
         orders=orders,
         spectrogram=spectrogram,
         window=window,
@@ -340,6 +377,20 @@ def spectrum(
         solution=solution,
         warnings=warnings,
     )
+
+
+def _measured(run: Solution, of: str, sensor: Sensor) -> np.ndarray:
+    """A signal of a run as a sensor gives it; its noise is the same in every call."""
+    from ballpass.runtime.ask.spectrum import even_samples
+
+    time, values = even_samples(run.t, run[of])
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    if rate < sensor.rate * (1.0 - 1e-9):
+        raise RequestError(
+            f"--sensor: the run was sampled at {rate:.6g} Hz, and the sensor filters up to a tenth of "
+            f"{sensor.rate:.6g} Hz. Sample it at {sensor.rate:.6g} Hz, or ask for the scene's spectrum."
+        )
+    return sensor.measured(values, rate, np.random.default_rng(0))
 
 
 def _scene_rate(manifest: Manifest, values: Mapping[str, float]) -> float:

@@ -17,6 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.many.distributions import Distribution, shape_names
 from ballpass.runtime.many.signals import PRECISIONS, Signals
+from ballpass.runtime.run.sensor import Sensor, read_sensor
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -87,7 +88,7 @@ def read_spec(path: Path) -> DataSetSpec:
         title = TextKey(default="").read(root, "title") or path.stem
         seed = WholeKey(lowest=0, highest=MOST_SEED, example=1).read(root, "seed")
         chunk = WholeKey(lowest=1, highest=MOST_MEMBERS, example=32, optional=True).read(root, "chunk")
-        signals, outputs = _read_signals(root)
+        signals, outputs = _read_signals(root, path.parent)
         members = WholeKey(lowest=1, highest=MOST_MEMBERS, example=1000, optional=True)
         default = members.read(root, "members")
         base = TextKey(example="scene.toml", optional=True).read(root, "scene") or None
@@ -113,7 +114,7 @@ def read_spec(path: Path) -> DataSetSpec:
     return DataSetSpec(title=title, seed=seed, chunk=chunk, signals=signals, classes=tuple(specs))
 
 
-def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
+def _read_signals(root: Table, folder: Path) -> tuple[Signals | None, list[str]]:
     """The signals to record, and the names of the outputs; None where something is wrong."""
     from ballpass.derive.scene.keys import ChoiceKey, QuantityKey
 
@@ -126,6 +127,7 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
     rtol = QuantityKey(unit="1", example=1e-6, setting=True, optional=True).read(root, "rtol")
     precision = ChoiceKey(choices=PRECISIONS, default=PRECISIONS[0]).read(root, "precision")
     snr = _read_value(root, "snr", root.data["snr"], "1") if root.has("snr") else None
+    sensor = _read_sensor(root, folder)
     if len(root.collector.faults) > before or precision is None:
         return None, []
     try:
@@ -138,6 +140,7 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
             rtol=rtol,
             precision=precision,
             quantities=tuple(dict.fromkeys(quantities)),
+            sensor=sensor,
         )
     except RequestError as fault:
         for line in str(fault).splitlines():
@@ -146,6 +149,19 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
             root.fault(name, problem, allowed=allowed, remedy="correct the value")
         return None, []
     return signals, list(signals.outputs)
+
+
+def _read_sensor(root: Table, folder: Path) -> Sensor | None:
+    """The sensor; None where there is none, or where something is wrong with it."""
+    given = root.table("sensor", required=False)
+    if given.missing:
+        return None
+    try:
+        return read_sensor(given.data, folder)
+    except RequestError as fault:
+        name, _, problem = str(fault).partition(": ")
+        given.fault(name, problem, allowed="numbers of a sensor", remedy="see the reference of data sets")
+        return None
 
 
 def _names(root: Table, key: str, example: str) -> Any:

@@ -83,7 +83,12 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
     values: dict[str, Any] = {}
     for name, (kind, option) in kinds.items():
         text, flag = given[name], option.flag(name)
-        if text is None or not option.unit:
+        if text is not None and option.reader is not None:
+            try:
+                values[name] = option.reader(text)
+            except RequestError as fault:
+                raise RequestError(f"{flag}: {fault}") from None
+        elif text is None or not option.unit:
             values[name] = (text or None) if is_of(kind, Sequence) else text
         elif is_of(kind, tuple):
             values[name] = _band(flag, text, option)
@@ -118,7 +123,7 @@ def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> in
     required = parameter.default is inspect.Parameter.empty
     if is_of(kind, Sequence):
         kind = list[str] if required else list[str] | None
-    elif option.unit:
+    elif option.unit or option.reader:
         kind = str if required else str | None
     flags = option.flags or (option.flag(parameter.name),)
     info = typer.Option(*flags, metavar=option.shown, help=option.help(parameter.name))
