@@ -81,6 +81,8 @@ def power_outputs(
     ]
     if weights:
         out.append(("weight.power", power_of(weights), "W", "Power of all weights"))
+        height = sp.Add(*(-weight.amount * weight.place for weight in weights))
+        out.append(("weight.energy", height, "J", "Potential energy of all weights, 0 at the frame's origin"))
     if linkage.drive.coordinate is None:
         power = reactions.drive_torque * linkage.drive.speed
         out.append(("drive_power", power, "W", "Power of the drive"))
@@ -132,6 +134,17 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
         )
     ]
     element = ELEMENTS[bearing.element]
+    if bearing.contact.smoothing is None:  # k delta^n from 0 on
+        out.append(
+            Output(
+                name=f"{names.prefix}contact.energy",
+                expression=count * force * ball.deflection / (element.exponent + 1),
+                unit="J",
+                description=f"Potential energy of the elastic forces of all {element.noun}s{of}",
+                balls_of=names.prefix,
+                over_balls=True,
+            )
+        )
     for ring, (constants, quantities) in element.contact_quantities(bearing, names, force).items():
         out += [
             Output(
@@ -178,12 +191,19 @@ def bearing_power_outputs(
         spring = -count * stiffness * dot(out, moving)
         rows = [
             ("housing.power", spring - loss, "W", f"Power of the housing's spring and damper{of}"),
+            (
+                "housing.energy",
+                count * stiffness * dot(out, out) / 2,
+                "J",
+                f"Potential energy of the housing's spring{of}",
+            ),
             ("housing.loss", loss, "W", f"Power loss of the housing's damper{of}"),
         ]
     force = (ball.sums[0].symbol, ball.sums[1].symbol)  # of the inner ring on the balls
     # where rings are loaded one-way the cage's moments have no effect
-    moment = cross(apart, force) if load is None else sp.S.Zero
-    power = count * (moment * ball.cage_speed - dot(force, parting))
+    moment = cross(apart, force)
+    power = count * ((moment * ball.cage_speed if load is None else sp.S.Zero) - dot(force, parting))
+    rows.append(("cage.moment", count * moment, "N*m", f"Moment of the rings on the cage{of}, counter-clockwise"))
     rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
     if load is not None:
         rows.append(("load.power", dot(load, speed), "W", f"Power of the load on the inner ring{of}"))

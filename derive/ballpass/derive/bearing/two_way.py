@@ -97,7 +97,10 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
         velocity, acceleration = add(housing.velocity, outer.velocity), add(housing.acceleration, outer.acceleration)
         inertias = [Inertia(amount=mass, rate=v, acceleration=a) for v, a in zip(velocity, acceleration, strict=True)]
         weight = ZERO if mechanism.gravity is None else scale(mass, components(mechanism.gravity, axis=(0, -1)))
-        weights = [Effort(amount=f, rate=v) for f, v in zip(weight, velocity, strict=True) if f != 0]
+        places = add(housing.position, outer.position)
+        weights = [
+            Effort(amount=f, rate=v, place=r) for f, v, r in zip(weight, velocity, places, strict=True) if f != 0
+        ]
         efforts += weights
         # the reaction is that of the housing: the inner ring's body feels it less what moves the outer ring
         carried = subtract(weight, scale(mass, acceleration))

@@ -31,10 +31,14 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """A force [N] or torque [N*m], and the rate [m/s] or [rad/s] along which it does work."""
+    """A force [N] or torque [N*m], and the rate [m/s] or [rad/s] along which it does work.
+
+    `place` is what changes at this rate, of weights [m].
+    """
 
     amount: sp.Expr
     rate: sp.Expr
+    place: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -51,9 +51,9 @@ def inertia_of(mechanism: Mechanism, linkage: Linkage) -> tuple[tuple[Inertia, .
     for body in mechanism.bodies:
         pose, mass = linkage.poses[body.name], symbol_of(body.mass)
         center = pose.center_of_mass
-        for v, a, g in zip(center.velocity, center.acceleration, gravity, strict=True):
+        for r, v, a, g in zip(center.position, center.velocity, center.acceleration, gravity, strict=True):
             inertias.append(Inertia(amount=mass, rate=v, acceleration=a))
-            efforts.append(Effort(amount=mass * g, rate=v))
+            efforts.append(Effort(amount=mass * g, rate=v, place=r))
         if body.inertia is not None and pose.rate != 0:
             inertias.append(Inertia(amount=symbol_of(body.inertia), rate=pose.rate, acceleration=pose.acceleration))
     return tuple(inertias), tuple(effort for effort in efforts if effort.amount != 0)

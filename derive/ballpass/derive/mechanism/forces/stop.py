@@ -90,6 +90,9 @@ class Stop(Law):
             (amount, measure.amount_unit, f"{kind.capitalize()} of the stop {name}, zero or above"),
         ):
             setting.outputs.append(Output(name=symbol.name, expression=symbol, unit=size, description=words))
+        stored = sp.Piecewise((symbol_of(self.stiffness) * compression**2 / 2, compression > border.symbol), (0, True))
+        words = f"Potential energy of the stop {name}"
+        setting.requested.append(Output(name=f"{label}.energy", expression=stored, unit="J", description=words))
         return -amount
 
     def words(self) -> str:
