@@ -90,6 +90,14 @@ NAMED: dict[str, dict[str, str]] = {
         "3 to 12 turns after the transient": "a number of the campaign",
         '"1 % on peak_ball_force: ... ms a cycle (stepper-rodas4, rtol 0.01)"': "the form of a sentence",
     },
+    "docs/theory/contact_angle.md": {
+        "angular contact bearing at 15 to 40": "catalogues",
+        "for deep groove bearings": "ISO/TR 1281-1, 7.2, as in `life.axial_factors`",
+        "for angular contact 1.25 and": "likewise",
+        "up to 15°, else": "likewise; 17.5° between the table's rows",
+        "Below 10° a": "ANGULAR_CONTACT of ask/wear.py",
+        "Table 3 of ISO 281": "the standard",
+    },
     "docs/howto/fmu.md": {"co-simulation by FMI 3,": "the standard's version"},
     "docs/howto/animate.md": {
         "about 260 kB": "a size",
