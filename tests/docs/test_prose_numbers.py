@@ -97,6 +97,7 @@ NAMED: dict[str, dict[str, str]] = {
         "up to 15°, else": "likewise; 17.5° between the table's rows",
         "Below 10° a": "ANGULAR_CONTACT of ask/wear.py",
         "Table 3 of ISO 281": "the standard",
+        "(ISO/TR 1281-1, 7.2):": "the standard",
     },
     "docs/howto/fmu.md": {"co-simulation by FMI 3,": "the standard's version"},
     "docs/howto/animate.md": {
