@@ -115,7 +115,7 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     out = [
         Output(
             name=f"{names.prefix}contact.stiffness.{axes}",
-            expression=count * slope * along,
+            expression=count * slope * along * ball.cosine**2,
             unit="N/m",
             description=f"Entry {axes} of the stiffness matrix of all balls{of}",
             balls_of=names.prefix,
@@ -199,7 +199,7 @@ def bearing_power_outputs(
             ),
             ("housing.loss", loss, "W", f"Power loss of the housing's damper{of}"),
         ]
-    force = (ball.sums[0].symbol, ball.sums[1].symbol)  # of the inner ring on the balls
+    force = ball.ring_force  # of the inner ring on the balls
     # where rings are loaded one-way the cage's moments have no effect
     moment = cross(apart, force)
     power = count * ((moment * ball.cage_speed if load is None else sp.S.Zero) - dot(force, parting))

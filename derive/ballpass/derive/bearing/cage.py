@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.cage_slip import kept_share, lag_of
+from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
@@ -101,7 +102,7 @@ class _Spin:
 def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol, behind: sp.Expr) -> _Spin:
     """Balls that roll on the outer raceway, which stands: as much of their surface passes as of the raceway."""
     start, speed = names.constant("spin_start"), names.constant("spin_speed")
-    rolls = 1 + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
+    rolls = contact_cosine(bearing) + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
     words = "Angle of a ball's material that meets the outer raceway"
     turned = phase(
         f"{bearing.prefix}spin",
@@ -203,7 +204,7 @@ def _ratio(bearing: Bearing, names: Names) -> Definition:
     given = None if bearing.cage is None else bearing.cage.ratio
     return names.define(
         cage_ratio(names),
-        (1 - ball_diameter / pitch_diameter) / 2 if given is None else symbol_of(given),
+        (1 - contact_cosine(bearing) * ball_diameter / pitch_diameter) / 2 if given is None else symbol_of(given),
         "1",
         "Speed of the cage over speed of the inner ring, " + ("r_b/(R_b + r_b), Eq. (7)" if given is None else "given"),
         r"\omega_c/\omega",

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.cage import Cage
+from ballpass.derive.bearing.contact_direction import contact_direction
 from ballpass.derive.bearing.effects import EFFECTS, GenericBall
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.laws import LAWS
@@ -37,6 +38,7 @@ class BallRelations:
     cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s], constant where the coupling is one-way
     in_outer, in_inner : angle of ball 1 as the rings see it, see `cage.Cage` [rad]
     cos, sin : of the angle of ball j
+    cosine : of the contact angle; 1 where the scene names none
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
     definitions : they use `cos` and `sin`
@@ -51,6 +53,7 @@ class BallRelations:
     in_inner: sp.Expr
     cos: sp.Symbol
     sin: sp.Symbol
+    cosine: sp.Expr
     deflection: sp.Symbol
     deflection_rate: sp.Symbol
     elastic_force: sp.Symbol
@@ -60,6 +63,12 @@ class BallRelations:
     definitions: tuple[Definition, ...]
     sums: tuple[Definition, ...]
     switching: Switching
+
+    @property
+    def ring_force(self) -> Pair:
+        """Force of the inner ring on the balls, x and y: the radial part of the balls' forces [N]."""
+        sum_x, sum_y = (s.symbol for s in self.sums)
+        return self.cosine * sum_x, self.cosine * sum_y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +97,8 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     """Contact of the balls; `cage` says how they turn."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
     stiffness = names.constant("k_b")
-    constants = [*ELEMENTS[bearing.element].stiffness(bearing, names), *cage.constants]
+    direction = contact_direction(bearing)
+    constants = [*direction.constants, *ELEMENTS[bearing.element].stiffness(bearing, names), *cage.constants]
     law = LAWS[bearing.damping.law]
     numbers = {q.path.rpartition(".")[2]: symbol_of(q) for q in bearing.damping.numbers}
     coefficient = law.coefficient(numbers, stiffness)
@@ -143,7 +153,8 @@ def _ball(
         sum((s * c.position for c, s in zip(coordinates[axis::2], (1, -1), strict=False)), start=sp.S.Zero)
         for axis in (0, 1)
     )
-    geometry = x * sp.cos(angle) + y * sp.sin(angle) - symbol_of(bearing.clearance) / 2
+    contact_at = contact_direction(bearing)
+    geometry = contact_at.cosine * (x * sp.cos(angle) + y * sp.sin(angle) - contact_at.gap)
     # Eq. (11): the time derivative, the cage turning
     rate = sp.diff(geometry.subs(motion), TIME)
     rate = rate.subs(sp.diff(angle, TIME), speed)
@@ -204,6 +215,7 @@ def _ball(
         in_inner=cage.in_inner,
         cos=cos,
         sin=sin,
+        cosine=contact_at.cosine,
         deflection=delta,
         deflection_rate=delta_rate,
         elastic_force=elastic,

@@ -75,7 +75,7 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
         if bearing.outer is not None
         else Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
     )
-    force = scale(count, (ball.sums[0].symbol, ball.sums[1].symbol))  # of the inner ring on the balls
+    force = scale(count, ball.ring_force)  # of the inner ring on the balls
     moment = cross(subtract(inner.position, outer.position), force)
     apart = subtract(inner.velocity, outer.velocity)
     efforts = [Effort(amount=-f, rate=v) for f, v in zip(force, apart, strict=True)]

@@ -32,7 +32,10 @@ from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.
-_NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle")
+_NUMBERS = (
+    *("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle"),
+    *("contact_angle", "axial_displacement"),
+)
 ELEMENT = ChoiceKey(
     words="Kind of the rolling elements",
     choices=tuple(ELEMENTS),
@@ -82,6 +85,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         if uneven:
             remedy = "load the bearing one-way" if coupling == "two-way" else "write speed instead of the table"
             refuse_uneven(table, EFFECTS, "effects on the balls are", uneven, f", or {remedy}")
+        _refuse_angle(table, element)
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
         numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
@@ -154,6 +158,32 @@ def _read_place(
         return name, share
     table.fault("joint", problem, given=given, allowed=allowed, remedy=remedy)
     return name, share
+
+
+def _refuse_angle(table: Table, element: RollingElement) -> None:
+    """Rules across the keys of the contact angle."""
+    contact = table.data.get("contact")
+    if element.name != "ball":
+        table.refuse(
+            ("contact_angle", "axial_displacement"),
+            f"a bearing of the element {show(element.name)} has no contact angle",
+            allowed='a contact angle with element = "ball"',
+            remedy="delete the key",
+        )
+    if table.has("contact_angle"):
+        table.refuse(
+            ("axial_displacement",),
+            "the contact angle is given twice",
+            allowed="contact_angle or axial_displacement",
+            remedy="delete one of the two",
+        )
+    elif isinstance(contact, dict) and "stiffness" in contact:
+        table.refuse(
+            ("axial_displacement",),
+            "the contact angle follows from the radii of the grooves, and the scene gives a stiffness",
+            allowed="axial_displacement with inner_groove_radius and outer_groove_radius in the table contact",
+            remedy="write contact_angle instead",
+        )
 
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:

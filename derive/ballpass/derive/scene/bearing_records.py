@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -346,6 +347,29 @@ class Bearing:
         usual=_CLEARANCE,
         groups=GROUPS,
         note='negative is preload. With a designation also a group: `"C2"`, `"CN"`, `"C3"`, `"C4"`, `"C5"`',
+    )
+    contact_angle: SceneNumber | None = quantity(
+        "rad",
+        "Contact angle",
+        r"\alpha",
+        "8 deg",
+        optional=True,
+        when="default: none, contact in the radial plane",
+        bounds=Bounds(least=0.0, below=math.pi / 2),
+        remedy="give an angle from 0 deg to below 90 deg",
+        usual=UsualRange(most=math.radians(50), hint="Angular contact bearings have up to 45 deg: check the unit."),
+        note="a constant of the run, with `clearance` as what is left radially; balls only, "
+        "see {doc}`../theory/contact_angle`",
+    )
+    axial_displacement: SceneNumber | None = not_negative(
+        "m",
+        "Axial displacement of the inner ring by its preload",
+        r"\delta_a",
+        "40 um",
+        optional=True,
+        when="instead of `contact_angle`",
+        usual=UsualRange(most=0.03, of="ball_diameter", hint="Preload moves rings by some hundredths: check the unit."),
+        note="the contact angle follows with `clearance` and grooves; not with a given `stiffness`",
     )
     ball_angle: SceneNumber = quantity(
         "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"

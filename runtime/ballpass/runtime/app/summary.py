@@ -32,6 +32,7 @@ from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -131,11 +132,12 @@ def _unusual(sol: Solution) -> list[str]:
     """
     said = []
     for bearing in sol.manifest.bearings:
-        ball, clearance = (sol.parameters[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
+        ball = sol.parameters[f"{bearing.path}.ball_diameter"]
+        known = {**sol.parameters, **sol.constants}
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
         apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
         displacement = float(np.max(apart))
-        deflection = displacement - clearance / 2.0
+        deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
         if deflection > FLATTENED * ball or displacement > ball:
             what = (
                 f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"

@@ -27,6 +27,7 @@ from ballpass.runtime.ratings.of_bearing import (
     Ratings,
     contacts_of,
     geometry_is_assumed,
+    geometry_of,
     ratings_of,
     why_no_life,
 )
@@ -91,7 +92,7 @@ def _bearing(
     ratings = ratings_of(info, values)
     initial = driver_angle.shaft_speed(manifest, values)
     peak = history.peaks[info.prefix]
-    force = max(peak.maximum, 0.0)
+    force, nominal = max(peak.maximum, 0.0), float(geometry_of(info, values).nominal_cosine)
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
     why = why_no_life(info, values, initial)
     speed = 0.0 if why else math.copysign(history.speeds[info.prefix], values[info.ring_speed])
@@ -112,7 +113,7 @@ def _bearing(
         peak_time=peak.maximum_time,
         peak_ball=int(peak.maximum_ball or 0),
         peak_angle=None if uneven else driver_angle.crank_angle(manifest, values, peak.maximum_time),
-        static_safety=static_safety(info.balls, float(ratings.static), force),
+        static_safety=static_safety(info.balls, float(ratings.static), force * nominal),
         inner=inner,
         outer=outer,
         speed=speed,
@@ -129,7 +130,7 @@ def _bearing(
 
 
 def static_safety(balls: int, static_rating: float, force: float) -> float:
-    """s_0 of the load whose heaviest ball bears `force` [N]: Z/5 of it, as in ISO 76."""
+    """s_0 of the load of which the heaviest ball bears `force` radially [N]: Z/5 of it, as in ISO 76."""
     return float(life.static_safety(static_rating, balls * force / 5.0)) if force > 0.0 else math.inf
 
 

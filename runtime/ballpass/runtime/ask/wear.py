@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.quantity.track import ChannelValues
-from ballpass.runtime.ratings.of_bearing import RacewayContact
+from ballpass.runtime.ratings.life import combined_load
+from ballpass.runtime.ratings.of_bearing import RacewayContact, contact_cosine
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.loop import Samples, start_run
@@ -29,6 +30,10 @@ SAMPLED_TURNS = 64
 ACROSS = 41
 
 
+#: A bearing with this contact angle or more in its scene is one of angular contact [rad].
+ANGULAR_CONTACT = float(np.radians(10.0))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoadSamples:
     """Loads of a bearing's balls at equally spaced times.
@@ -40,6 +45,8 @@ class LoadSamples:
     force : of each ball, zero where it pulls, shape (samples, balls) [N]
     resultant : force on the inner ring, shape (samples,) [N]
     in_outer, in_inner : angle of ball 1 as the rings see it, shape (samples,) [rad]
+    contact_angle : [rad]
+    deep_groove : whether the bearing has no contact angle of its own, whatever its preload makes of it
     """
 
     time: Array
@@ -48,12 +55,20 @@ class LoadSamples:
     resultant: Array
     in_outer: Array
     in_inner: Array
+    contact_angle: float = 0.0
+    deep_groove: bool = True
+
+    @property
+    def axial(self) -> Array:
+        """Axial force on the inner ring, shape (samples,) [N]."""
+        return np.asarray(np.sin(self.contact_angle) * np.sum(self.force, axis=1))
 
     def equivalent_load(self, power: float) -> float:
         """P of ISO 281, mean of a power over the angle that the rings turn against each other, else over time [N]."""
         turned = np.abs(_moved(self.in_outer) - _moved(self.in_inner))
         weight = turned if np.any(turned) else np.ones_like(turned)
-        return float(np.average(self.resultant**power, weights=weight) ** (1.0 / power))
+        load = combined_load(self.resultant, self.axial, self.contact_angle, deep_groove=self.deep_groove)
+        return float(np.average(load**power, weights=weight) ** (1.0 / power))
 
 
 def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSamples]:
@@ -96,6 +111,8 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
             crank=crank,
             force=np.maximum(force, 0.0),
             resultant=np.hypot(x[:, 0], y[:, 0]),
+            contact_angle=float(np.arccos(min(contact_cosine(bearing, numbers.values), 1.0))),
+            deep_groove=numbers.values.get(f"{bearing.path}.contact_angle", 0.0) < ANGULAR_CONTACT,
             in_outer=outer[:, 0],
             in_inner=inner[:, 0],
         )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
+from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.run import driver_angle
 
 #: Multiples that are looked for: of ball passes, of these with sidebands, of the cage (more are ball passes); and the
@@ -75,7 +76,8 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
         cage=cage,
         ball_pass_outer=bearing.balls * cage,
         ball_pass_inner=bearing.balls * inner,
-        ball_spin=cage * (1.0 + values[f"{at}.pitch_diameter"] / values[f"{at}.ball_diameter"]),
+        ball_spin=cage
+        * (contact_cosine(bearing, values) + values[f"{at}.pitch_diameter"] / values[f"{at}.ball_diameter"]),
     )
 
 

@@ -18,6 +18,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
+from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.run import driver_angle
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
@@ -151,10 +152,14 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     else:
         of = f"{at}.outer_pass_speed" if f"{at}.outer_pass_speed" in values else f"{at}.cage_speed"
     slope = frequency / values[of] * view.slopes(of) if values[of] else 0.0 * view.slopes(of)
-    if what == "ball_spin":  # in proportion to 1 + pitch/ball
+    if what == "ball_spin":  # in proportion to cos(contact angle) + pitch/ball
         ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
         ratio = values[pitch] / values[ball]
-        slope = slope + frequency / (1.0 + ratio) * (view.slopes(pitch) - ratio * view.slopes(ball)) / values[ball]
+        moved = (view.slopes(pitch) - ratio * view.slopes(ball)) / values[ball]
+        angled = f"{at}.cos_contact_angle"
+        if angled in values:
+            moved = moved + view.slopes(angled)
+        slope = slope + frequency / (contact_cosine(bearing, values) + ratio) * moved
     return frequency, slope
 
 

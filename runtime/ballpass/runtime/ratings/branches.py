@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 
 def larger(a: Any, b: Any) -> Any:
     """The larger of two numbers."""
@@ -14,6 +16,11 @@ def larger(a: Any, b: Any) -> Any:
 def smaller(a: Any, b: Any) -> Any:
     """The smaller of two numbers."""
     return (a + b - abs(a - b)) / 2.0
+
+
+def cosine(angle: Any) -> Any:
+    """Cosine of an angle [rad]; NumPy's own warns of CasADi's symbols."""
+    return angle.cos() if hasattr(angle, "cos") else np.cos(angle)
 
 
 def interpolated(x: Any, knots: Sequence[float], values: Sequence[float]) -> Any:

@@ -30,38 +30,41 @@ class KinematicFrequencies:
 
 
 def kinematic_frequencies(
-    balls: int, ball_diameter: float, pitch_diameter: float, speed: float
+    balls: int, ball_diameter: float, pitch_diameter: float, speed: float, contact_angle: float = 0.0
 ) -> KinematicFrequencies:
-    """Frequencies of a deep groove ball bearing: rolling without slip, contact angle zero, outer ring at rest.
+    """Frequencies of a deep groove ball bearing: rolling without slip, outer ring at rest.
 
     Parameters
     ----------
     balls : number of balls [1]
     ball_diameter, pitch_diameter : [m]
     speed : angular speed of the inner ring, either sense [rad/s]
+    contact_angle : from 0 to below a right angle [rad]
 
     Raises
     ------
     RequestError
-        The ball count or a diameter is not that of a bearing.
+        The ball count, a diameter or the contact angle is not that of a bearing.
 
     References
     ----------
-    Harris & Kotzalas, Essential Concepts of Bearing Technology, 5th ed., 2006, ch. 10 with alpha = 0.
+    Harris & Kotzalas, Essential Concepts of Bearing Technology, 5th ed., 2006, ch. 10.
     """
-    if balls < 1 or not 0.0 < ball_diameter < pitch_diameter or not np.isfinite(speed):
+    angled = 0.0 <= contact_angle < np.pi / 2.0
+    if balls < 1 or not 0.0 < ball_diameter < pitch_diameter or not np.isfinite(speed) or not angled:
         raise RequestError(
             f"balls {balls!r}, ball_diameter {ball_diameter!r} m, pitch_diameter {pitch_diameter!r} m, "
-            f"speed {speed!r} rad/s; "
-            "allowed: balls >= 1, 0 < ball_diameter < pitch_diameter, finite speed"
+            f"speed {speed!r} rad/s, contact_angle {contact_angle!r} rad; "
+            "allowed: balls >= 1, 0 < ball_diameter < pitch_diameter, finite speed, 0 <= contact_angle < pi/2"
         )
     shaft = abs(speed) / (2.0 * np.pi)
-    ratio = ball_diameter / pitch_diameter
+    cosine = float(np.cos(contact_angle))
+    ratio = cosine * ball_diameter / pitch_diameter
     cage = shaft * (1.0 - ratio) / 2.0
     return KinematicFrequencies(
         shaft=shaft,
         cage=cage,
         ball_pass_outer=balls * cage,
         ball_pass_inner=balls * (shaft - cage),
-        ball_spin=shaft * (1.0 - ratio**2) / (2.0 * ratio),
+        ball_spin=cosine * shaft * (1.0 - ratio**2) / (2.0 * ratio),
     )

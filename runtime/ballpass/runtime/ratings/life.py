@@ -87,6 +87,32 @@ def basic_life(dynamic_rating: Any, load: Any, of: ElementLife = BALLS) -> Any:
     return MILLION * (dynamic_rating / load) ** float(of.basic)
 
 
+def axial_factors(angle: float, *, deep_groove: bool) -> tuple[float, float, float]:
+    """X, Y and e of a single-row radial ball bearing: P = X F_r + Y F_a where F_a/F_r exceeds e, else F_r.
+
+    X = 1 - 0.4 ξ/η, Y = 0.4 cot α/η, e = ξ tan α, which Table 3 of ISO 281:2007 is made of (ISO/TR 1281-1:2008, 7.2).
+    The table has them over the load or the nominal angle, and takes the angle from it; here it is that of the scene.
+
+    Parameters
+    ----------
+    angle : contact angle in operation, above zero [rad]
+    deep_groove : whether the bearing has no contact angle of its own; else one of angular contact
+    """
+    if deep_groove:
+        test, reduction = 1.05, 1.0 - 0.4 * np.sin(np.radians(5.0))
+    else:
+        test, reduction = 1.25, 1.0 - (0.4 if angle < np.radians(17.5) else 1.0 / 2.75) * np.sin(angle)
+    return 1.0 - 0.4 * test / reduction, float(0.4 / (np.tan(angle) * reduction)), float(test * np.tan(angle))
+
+
+def combined_load(radial: Any, axial: Any, angle: float, *, deep_groove: bool) -> Any:
+    """P of a radial and an axial load [N]; ISO 281:2007, see `axial_factors`."""
+    if angle == 0.0:
+        return radial
+    x, y, e = axial_factors(angle, deep_groove=deep_groove)
+    return np.where(axial > e * radial, x * radial + y * axial, radial)
+
+
 def hours(turns: Any, speed: Any) -> Any:
     """Hours of a number of turns at a speed [rad/s]."""
     return turns * 2.0 * np.pi / speed / 3600.0

@@ -60,10 +60,12 @@ def tabulated_static_factor(gamma: Any) -> Any:
     return interpolated(gamma, GAMMA, STATIC_FACTORS)
 
 
-def static_rating(balls: Any, ball_diameter: Any, pitch_diameter: Any, grooves: Any = REFERENCE_GROOVES) -> Any:
-    """Basic static load rating C_0r = f_0 Z D_w² [N], with f_0 of `static_factor`.  Source: ISO 76:2006."""
-    factor = static_factor(ball_diameter / pitch_diameter, grooves)
-    return factor * balls * (1e3 * ball_diameter) ** 2
+def static_rating(
+    balls: Any, ball_diameter: Any, pitch_diameter: Any, grooves: Any = REFERENCE_GROOVES, cosine: Any = 1.0
+) -> Any:
+    """Basic static load rating C_0r = f_0 Z D_w² cos α [N], with f_0 of `static_factor`.  Source: ISO 76:2006."""
+    factor = static_factor(cosine * ball_diameter / pitch_diameter, grooves)
+    return cosine * factor * balls * (1e3 * ball_diameter) ** 2
 
 
 def dynamic_factor(gamma: Any) -> Any:
@@ -98,11 +100,12 @@ def dynamic_rating(
     pitch_diameter: Any,
     grooves: tuple[Any, Any] = REFERENCE_GROOVES,
     material_factor: Any = MATERIAL_FACTOR,
+    cosine: Any = 1.0,
 ) -> Any:
     """Basic dynamic load rating C_r [N].
 
-    b_m f_c Z^(2/3) D_w^1.8, and 3.647 D_w^1.4 for D_w^1.8 above 25.4 mm, where the two meet; times `groove_effect`.
-    Source: ISO 281:2007.
+    b_m f_c (cos α)^0.7 Z^(2/3) D_w^1.8, and 3.647 D_w^1.4 for D_w^1.8 above 25.4 mm, where the two meet; times
+    `groove_effect`.  Source: ISO 281:2007.
 
     Parameters
     ----------
@@ -110,10 +113,11 @@ def dynamic_rating(
     ball_diameter, pitch_diameter : D_w, D_pw [m]
     grooves : groove radius over ball diameter, inner and outer [1]
     material_factor : b_m [1]
+    cosine : of the nominal contact angle [1]
     """
-    gamma, diameter = ball_diameter / pitch_diameter, 1e3 * ball_diameter
+    gamma, diameter = cosine * ball_diameter / pitch_diameter, 1e3 * ball_diameter
     factor = material_factor * dynamic_factor(gamma) * groove_effect(gamma, grooves)
-    return factor * balls ** (2.0 / 3.0) * smaller(diameter**1.8, 3.647 * diameter**1.4)
+    return cosine**0.7 * factor * balls ** (2.0 / 3.0) * smaller(diameter**1.8, 3.647 * diameter**1.4)
 
 
 def fatigue_limit(static_rating: Any, pitch_diameter: Any) -> Any:

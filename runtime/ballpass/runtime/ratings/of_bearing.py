@@ -12,6 +12,7 @@ from typing import Any
 
 from ballpass.runtime.contract import BearingInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.ratings.branches import cosine
 from ballpass.runtime.ratings.elements import RATED, ElementGeometry, RacewayContact, RatedElement
 from ballpass.runtime.ratings.life import ElementLife
 
@@ -85,13 +86,25 @@ def rated_element(bearing: BearingInfo) -> RatedElement:
 
 def geometry_of(bearing: BearingInfo, values: Mapping[str, Any]) -> ElementGeometry:
     """What the bearing's elements are rated by; `values` are parameters by name [SI]."""
-    contact = f"{bearing.path}.contact."
+    contact, nominal = f"{bearing.path}.contact.", values.get(f"{bearing.path}.contact_angle")
     return ElementGeometry(
         balls=bearing.balls,
         diameter=values[f"{bearing.path}.ball_diameter"],
         pitch=values[f"{bearing.path}.pitch_diameter"],
+        nominal_cosine=1.0 if nominal is None else cosine(nominal),
+        cosine=contact_cosine(bearing, values),
         contact={name.removeprefix(contact): values[name] for name in values if name.startswith(contact)},
     )
+
+
+def contact_cosine(bearing: BearingInfo, values: Mapping[str, Any]) -> Any:
+    """Cosine of the contact angle of a run, 1 where the scene names none; `values` with derived constants."""
+    return values.get(f"{bearing.path}.cos_contact_angle", 1.0)
+
+
+def radial_gap(bearing: BearingInfo, values: Mapping[str, float]) -> float:
+    """How far the inner ring moves until a ball is in contact [m]; `values` with derived constants."""
+    return values.get(f"{bearing.path}.radial_gap", 0.5 * values[f"{bearing.path}.clearance"])
 
 
 #: Rings turn against each other above this part of the speed of the driver [1].

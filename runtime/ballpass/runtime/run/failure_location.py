@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 
@@ -65,7 +66,8 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     for bearing, turned in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
         angles = turned % driver_angle.TURN
         x, y = (_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, state) for axis in "xy")
-        deflections = x * np.cos(angles) + y * np.sin(angles) - 0.5 * values[f"{bearing.path}.clearance"]  # Eq. (6)
+        apart = x * np.cos(angles) + y * np.sin(angles) - radial_gap(bearing, values)
+        deflections = contact_cosine(bearing, values) * apart  # Eq. (6)
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
             found = FailureLocation(

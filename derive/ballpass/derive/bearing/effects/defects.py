@@ -21,6 +21,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
+from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
@@ -227,7 +228,9 @@ class _SpallContact:
         """What the lag of a cage whose slip changes adds to the angle of the windows, row by row."""
         each = self.bearing.balls
         if self.spall.on == "ball":
-            each = 1 + symbol_of(self.bearing.pitch_diameter) / symbol_of(self.bearing.ball_diameter)
+            each = contact_cosine(self.bearing) + symbol_of(self.bearing.pitch_diameter) / symbol_of(
+                self.bearing.ball_diameter
+            )
         lags = lag_names(self.bearing, self.names)
         return tuple((self._symbol(f"lag.{k}"), -each * lag) for k, lag in enumerate(lags, start=1))
 
@@ -238,9 +241,10 @@ class _SpallContact:
 
     @property
     def _radii(self) -> tuple[sp.Expr, sp.Expr]:
-        """Of the ball and of the raceway."""
+        """Of the ball, and of the circle of contacts on the raceway."""
         ball, pitch = symbol_of(self.bearing.ball_diameter), symbol_of(self.bearing.pitch_diameter)
-        return ball / 2, (pitch + ball) / 2 if self.ring == "outer" else (pitch - ball) / 2
+        inwards = contact_cosine(self.bearing) * ball
+        return ball / 2, (pitch + inwards) / 2 if self.ring == "outer" else (pitch - inwards) / 2
 
     def constants(self) -> Iterator[Definition]:
         """Half angle, and the edges of the windows: of a raceway's spall times the number of balls."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import sympy as sp
 
+from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.scene.bearing_records import Material
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.read_keys import Either, keys_of, read_record
@@ -160,14 +161,15 @@ def compliance(contact: Any) -> sp.Expr:
 
 
 def raceway_radius(ring: str, bearing: Bearing, names: Names) -> Definition:
-    """Radius of a raceway from the bearing's axis."""
-    inner = ring == "inner"
+    """Radius of a raceway from the bearing's axis; at a contact angle, in the plane in which a ball rolls."""
+    inner, cosine = ring == "inner", contact_cosine(bearing)
+    where = "from the bearing axis, Eq. (7)" if cosine == 1 else "in the plane of rolling"
     ball, pitch = symbol_of(bearing.ball_diameter), symbol_of(bearing.pitch_diameter)
     return names.define(
         names.constant(f"{ring}_raceway_radius"),
-        (pitch - (1 if inner else -1) * ball) / 2,
+        (pitch / cosine - (1 if inner else -1) * ball) / 2,
         "m",
-        f"Radius of the {ring} raceway from the bearing axis, Eq. (7)",
+        f"Radius of the {ring} raceway {where}",
         "r_b" if inner else "R_b",
     )
 

@@ -56,16 +56,29 @@ class RatedBall(RatedElement):
         return math.pi / 6.0 * geometry.diameter**3
 
     def dynamic_rating(self, geometry: ElementGeometry) -> Any:
-        return load_ratings.dynamic_rating(geometry.balls, geometry.diameter, geometry.pitch, self._grooves(geometry))
+        return load_ratings.dynamic_rating(
+            geometry.balls,
+            geometry.diameter,
+            geometry.pitch,
+            self._grooves(geometry),
+            cosine=geometry.nominal_cosine,
+        )
 
     def static_rating(self, geometry: ElementGeometry) -> Any:
-        return load_ratings.static_rating(geometry.balls, geometry.diameter, geometry.pitch, self._grooves(geometry))
+        return load_ratings.static_rating(
+            geometry.balls,
+            geometry.diameter,
+            geometry.pitch,
+            self._grooves(geometry),
+            cosine=geometry.nominal_cosine,
+        )
 
     def fatigue_limit(self, static_rating: Any, pitch: Any) -> Any:
         return load_ratings.fatigue_limit(static_rating, pitch)
 
     def ring_ratings(self, dynamic_rating: Any, geometry: ElementGeometry) -> tuple[Any, Any]:
-        return life.ball_ratings(dynamic_rating, geometry.balls, geometry.gamma, self._grooves(geometry))
+        at_angle = dynamic_rating / geometry.nominal_cosine**0.7
+        return life.ball_ratings(at_angle, geometry.balls, geometry.gamma, self._grooves(geometry))
 
     def is_assumed(self, geometry: ElementGeometry) -> bool:
         return "inner_groove_radius" not in geometry.contact

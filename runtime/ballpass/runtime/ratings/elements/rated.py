@@ -24,17 +24,21 @@ class ElementGeometry:
     balls : number of elements
     diameter, pitch : of an element, and of the circle of their centres [m]
     contact : numbers of the scene's table of contact, by their keys
+    nominal_cosine : of the contact angle that ratings are for: of a deep groove bearing 1, however it is preloaded
+    cosine : of the contact angle at which it runs
     """
 
     balls: Any
     diameter: Any
     pitch: Any
     contact: Mapping[str, Any]
+    nominal_cosine: Any = 1.0
+    cosine: Any = 1.0
 
     @property
     def gamma(self) -> Any:
-        """D_w/D_pw [1]."""
-        return self.diameter / self.pitch
+        """D_w cos(alpha)/D_pw [1]."""
+        return self.nominal_cosine * self.diameter / self.pitch
 
     def materials(self) -> list[tuple[Any, Any]]:
         """Young's modulus [Pa] and Poisson's ratio of rings, and of elements where they differ; none if not given."""
@@ -45,8 +49,11 @@ class ElementGeometry:
         ]
 
     def raceway_radius(self, sign: float) -> Any:
-        """From the bearing's axis; of the inner ring for the sign 1, of the outer one, and negative, for -1 [m]."""
-        return sign * (self.pitch - sign * self.diameter) / 2.0
+        """In the plane of rolling; without contact angle from the bearing's axis.
+
+        Of the inner ring for the sign 1, of the outer one, and negative, for -1 [m].
+        """
+        return sign * (self.pitch / self.cosine - sign * self.diameter) / 2.0
 
 
 class RacewayContact(ABC):
