@@ -110,7 +110,7 @@ def read_cwru(folder: Path, orders: dict[str, float], spalls: dict[int, str]) ->
     """Drive-end recordings at 12 kHz; `spalls` says what each file number has.  Load in horsepower."""
     found = []
     for number, spall in spalls.items():
-        path = _only(folder, f"{number}*.mat")
+        path = only(folder, f"{number}*.mat")
         data = loadmat(path, squeeze_me=True)
         signal = np.asarray(next(data[key] for key in data if key.endswith("DE_time")), dtype=float)
         speed = float(next(data[key] for key in data if key.endswith("RPM"))) / 60.0
@@ -141,7 +141,8 @@ def read_mfpt(folder: Path, orders: dict[str, float]) -> list[SpallLines]:
     return sorted(found, key=lambda one: (one.spall, one.load))
 
 
-def _only(folder: Path, pattern: str) -> Path:
+def only(folder: Path, pattern: str) -> Path:
+    """The one recording of a pattern."""
     found = sorted(folder.rglob(pattern))
     found = [path for path in found if re.match(pattern.partition("*")[0] + r"\D", path.name)]
     if len(found) != 1:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scripts.validation import cage_lag, lines, spall_lines
+from scripts.validation import cage_lag, classifier, lines, spall_lines
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "validation"
-SCRIPTS = ("spall_lines", "cage_lag", "lives", "motions")
+SCRIPTS = ("spall_lines", "cage_lag", "lives", "motions", "classifier")
 
 
 def text(name: str) -> str:
@@ -62,6 +62,15 @@ def test_the_contact_angle_of_outer_spalls_gives_the_lines_of_inner_ones() -> No
     others = {130: 3.5962, 131: 3.5972, 132: 3.5973, 133: 3.5969, 105: 5.3984, 106: 5.4016, 107: 5.4018, 108: 5.4000}
     for number, order in others.items():
         assert rows[number].line == pytest.approx(order, abs=1.1e-4)
+
+
+def test_lines_of_a_spall_stand_higher_than_those_of_the_other_ring() -> None:
+    """In every second of the files that were chosen; BPFO against BPFI, without a classifier."""
+    seconds = [one for one in classifier.measured(None) if one.file in (*range(105, 109), *range(130, 134))]
+    assert len(seconds) == 80
+    for one in seconds:
+        outer, inner = one.features[0], one.features[2]
+        assert (outer > inner) == (one.label == "outer")
 
 
 def test_lines_are_found_where_they_were_put() -> None:
