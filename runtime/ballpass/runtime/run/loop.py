@@ -21,12 +21,11 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.method_registry import CHOICE, STEPPERS
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
-from ballpass.runtime.run.failure_location import FailureLocation, locate_failure
+from ballpass.runtime.run.failure_location import FailureLocation, locate_failure, stall_words
 from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.segments import joined_segments, rest_of, run_windows
-from ballpass.runtime.run.stall import stall_words
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
