@@ -94,7 +94,7 @@ class System:
         )
 
     def _repr_html_(self) -> str:
-        from ballpass.derive.emit.equations_html import equations_html  # above, by name in pyproject.toml: an object's
+        from ballpass.derive.emit.equations import equations_html  # above, by name in pyproject.toml: an object's
         # view is found at the object
 
         return equations_html(self)

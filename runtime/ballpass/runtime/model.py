@@ -176,7 +176,7 @@ class Model(PointModel, Questions):
         parameters : overrides of parameters, SI
         method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
             ``cvodes``
-        rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.scales`)
+        rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.magnitudes`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
             the run ends at the last one.  The stepper takes the same steps for any samples of a run of one length;

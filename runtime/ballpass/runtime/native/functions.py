@@ -20,8 +20,7 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler, find_compiler
-from ballpass.runtime.native.kernel import Array, CompiledKernel, Loop
-from ballpass.runtime.native.loops import CompiledLoop, PointLoop
+from ballpass.runtime.native.kernel import Array, CompiledKernel, CompiledLoop, Loop, PointLoop
 
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")

@@ -309,7 +309,7 @@ class Stepper:
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
     ) -> np.ndarray:
-        """Magnitudes of the states of a run (see `ballpass.runtime.run.scales`), shape (states,).
+        """Magnitudes of the states of a run (see `ballpass.runtime.run.magnitudes`), shape (states,).
 
         The library that locates kinks has none: they are those of the plain one.
 

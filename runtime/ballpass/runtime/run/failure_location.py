@@ -1,4 +1,4 @@
-"""State of a machine when a run ended early: crank angle and the most loaded ball, for messages."""
+"""State of a machine when a run ended early: crank angle, most loaded ball, torque a stalled driver lacks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
+from ballpass.runtime.run.magnitudes import mass_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -78,6 +79,36 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
                 deflection=float(deflections[ball]),
             )
     return found
+
+
+def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
+    """The window at whose edge the driver stands, and the torque that would hold it within that window, at rest.
+
+    Parameters
+    ----------
+    state : where the run ended, shape (states,)
+    """
+    manifest, values = model.manifest, numbers.values
+    assert manifest.mechanism is not None  # it has the driver
+    names, half = [info.name for info in manifest.states], len(manifest.states) // 2
+    driver = names.index(manifest.mechanism.angle)
+    edges = [
+        (abs(math.remainder(state[driver] - values[path], driver_angle.TURN)), row, path)
+        for row, item in enumerate(manifest.inputs)
+        if item.kind == "border" and item.windows
+        for path in item.windows[0]
+    ]
+    _, row, path = min(edges)
+    u = driver_angle.inputs_at(manifest.inputs, values, 0.0)
+    u[row] = -math.inf  # open, on either side of the edge
+    there = {"t": 0.0, "x": np.concatenate([state[:half], np.zeros(half)]), "u": u, "p": numbers.p, "c": numbers.c}
+    acceleration = float(model.kernel("rhs")(there)[half + driver])
+    inertia = 1.0 / float(np.linalg.inv(mass_matrix(model, there))[driver, driver])
+    load = manifest.inputs[row].name.split(".")[1]
+    return (
+        f"The driver stands at {path} = {math.degrees(values[path]):.6g} deg; within that window of {load} it lacks "
+        f"{abs(inertia * acceleration):.4g} N*m at rest."
+    )
 
 
 def _relative(coordinate: CoordinateInfo, at: Mapping[str, int], state: np.ndarray) -> float:

@@ -1,15 +1,26 @@
-"""Largest and smallest values of a run: how large, when, and of which ball."""
+"""Largest and smallest values of a run: how large, when, and of which ball.
+
+Their derivatives jump where another peak becomes the largest: where a small change of a parameter does that, a sentence
+says so.  A peak of about the same derivative does not count, for example the same peak in another turn.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from ballpass.runtime.quantity.competing_peaks import competing_peak
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 SECOND = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / 180.0
+
+#: A change of a parameter by this share of its value, or of a radian, is a small one [1].
+NEAR = 1e-3
+
+#: Derivatives (p/Q) dQ/dp that differ by less are one: by this share of the larger one, and by themselves [1].
+ALIKE, FLOOR = 0.1, 1e-3
 
 
 def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
@@ -25,7 +36,7 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
         notes.append("at an edge: the moment moves with it")
     # the minimum over the most loaded balls is not an extreme of one ball
     ranked = kind == "min" and signal.value.shape[1] > 1 and quantity.ball is None
-    kink = "" if ranked else competing_peak(view, quantity, mark)
+    kink = "" if ranked else _competing_peak(view, quantity, mark)
     ball = _ball(view, quantity, mark)
     return Estimate(value=mark.value, slope=slope, time=mark.time, ball=ball, notes=tuple(notes), kink=kink)
 
@@ -82,6 +93,39 @@ def _range(view: View, quantity: Quantity) -> Estimate:
 
 def _reduced_range(runs: ReducedRuns, quantity: Quantity) -> Array:
     return runs.entry("max", quantity.channel) - runs.entry("min", quantity.channel)
+
+
+def _competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
+    """The extreme that the smallest change of a parameter puts in place of this one."""
+    signal = view.signals[quantity.channel]
+    best, slope = signal.value[mark.node, mark.ball], signal.slope[mark.node, mark.ball]
+    scales = np.array([_scale(view, name) for name in view.names])
+    nearest, words = NEAR, ""
+    together = range(signal.value.shape[1] if quantity.ball is None else 0)  # balls that share the load of that moment
+    for other in (*(replace(mark, ball=ball) for ball in together if ball != mark.ball), *mark.competing):
+        value, its = signal.value[other.node, other.ball], signal.slope[other.node, other.ball]
+        apart = np.abs(its - slope) * scales
+        least = np.maximum(ALIKE * np.maximum(np.abs(its), np.abs(slope)) * scales, FLOOR * abs(best))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.where(apart > least, np.abs(value - best) / apart, np.inf)
+        k = int(np.argmin(change)) if change.size else 0
+        if change.size and change[k] < nearest:
+            nearest = change[k]
+            places = [
+                f"t = {one.time:.6g} s{f', ball {one.ball + 1}' if signal.value.shape[1] > 1 else ''}"
+                for one in (other, mark)
+            ]
+            words = (
+                f"a change of {view.names[k]} by {nearest * scales[k]:.2g} puts the extreme at {places[0]} in place of "
+                f"that at {places[1]}, and makes the derivative {its[k]:.4g} instead of {slope[k]:.4g}"
+            )
+    return words
+
+
+def _scale(view: View, name: str) -> float:
+    """Scale of a change of a parameter: its value; of an angle a radian."""
+    unit = next(info.unit for info in view.manifest.parameters if info.name == name)
+    return 1.0 if unit == "rad" else abs(view.numbers.parameters[name])
 
 
 KINDS = (
