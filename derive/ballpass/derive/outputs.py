@@ -48,7 +48,7 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     for ring, angle in (("outer", ball.in_outer), ("inner", ball.in_inner)):
         words = f"Angle of ball 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
         out.append(Output(name=f"{prefix}cage.in_{ring}", expression=angle, unit="rad", description=words))
-    for axis, total in zip("xy", ball.sums, strict=True):
+    for axis, total in zip("xy", ball.sums, strict=False):
         words = f"Force of the inner ring on the balls{of} along {axis}, Eqs. (8) and (9)"
         out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total.symbol, unit="N", description=words))
     for axis, force in zip("xy", load or (), strict=False):

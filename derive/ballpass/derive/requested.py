@@ -184,6 +184,8 @@ def bearing_power_outputs(
     # where rings are loaded one-way the cage's moments have no effect
     moment = cross(apart, force) if load is None else sp.S.Zero
     power = count * (moment * ball.cage_speed - dot(force, parting))
+    if load is None and ball.ring_rate is not None:
+        power += count * sum(total.symbol for total in ball.sums[2:]) * ball.ring_rate
     rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
     if load is not None:
         rows.append(("load.power", dot(load, speed), "W", f"Power of the load on the inner ring{of}"))
