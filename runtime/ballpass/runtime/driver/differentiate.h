@@ -204,6 +204,7 @@ static void tangent_switch(bp_run *run, double t)
     for (int w = 0; w < BP_WINDOWS; w++) {
         if (!run->sides.turn[BP_FIRST_WINDOW + w]) continue;
         run->driver.held[bp_window_input[w]] = -run->sides.border[BP_FIRST_WINDOW + w];
+        sides_jump(run, t);
         bp_explicit_rate(n, t, run->x, behind);
         for (long b = 0; b < tangents->blocks; b++) {
             bp_step_points points;

@@ -233,6 +233,15 @@ static inline void bp_turn_sides(bp_sides *s, double time, double step)
     }
 }
 
+/* Sides of the balls where an effect on them begins or ends: deflections and rates jump there, and so do switching functions.  Those that
+   are about to turn by themselves do so afterwards. */
+static inline void bp_sides_jump(bp_sides *restrict s, const bp_numbers *n, double t, const double *restrict x)
+{
+    bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+    for (int e = s->first; e < BP_FIRST_LOAD; e++)
+        if (!s->turn[e] && s->side[e] * s->seen[0][e] < -s->band[e]) bp_set_side(s, e, -s->side[e]);
+}
+
 /* After an accepted step: its end is the next start, and released events return after their steps. */
 static inline void bp_sides_move_on(bp_sides *s)
 {

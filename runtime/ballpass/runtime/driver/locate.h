@@ -357,6 +357,9 @@ static void sides_here(bp_run *run)
     hold_borders(run);
 }
 
+/* After a jump of an input, or of the gate of an effect. */
+static void sides_jump(bp_run *run, double t) { bp_sides_jump(&run->sides, &run->numbers, t, run->x); }
+
 static void sides_start(bp_run *run, double t)
 {
     run->lead = 1.0;
@@ -423,6 +426,7 @@ static int aim(bp_run *run, double t, double longest, double resolution, double 
 #define segment_inputs(run, values) ((run)->numbers.u = (values))
 #define has_stalled(run) 0
 #define sides_start(run, t) ((void)0)
+#define sides_jump(run, t) ((void)0)
 #define sides_here(run) ((void)0)
 #define sides_of_method(run) ((void)0)
 #define keep_sides(run) ((void)0)
