@@ -48,7 +48,7 @@ class StateSwitch:
 
     `function` is zero there, and `rate` its time derivative; the input `border` is zero, or infinite while a step holds
     the side on which it started.  That of a window of an `angle` names the edges, [rad]; others are sizes, in
-    [m] or [rad], without one.
+    [m] or [rad], without one.  `turning` is the rate of the angle [rad/s].
     """
 
     border: Input
@@ -56,6 +56,7 @@ class StateSwitch:
     rate: sp.Expr
     changes: str
     angle: sp.Expr | None = None
+    turning: sp.Expr = sp.S.Zero
 
 
 def phase(name: str, description: str, latex: str, *, offset: str, rate: str) -> Input:

@@ -94,6 +94,7 @@ def _edges(name: str, number: int, angle: tuple[sp.Expr, sp.Expr], start: str, e
         rate=slope * angle[1],
         changes=f"`gate.{name}`",
         angle=angle[0],
+        turning=angle[1],
     )
 
 
