@@ -200,7 +200,8 @@ def _ball(
         )
         for axis, along in (("x", cos), ("y", sin))
     )
-    if own is not None and own.slope is not None and bearing.coupling == "two-way":
+    sloped = own is not None and any(d.symbol == own.slope and d.expression != 0 for d in own.definitions)
+    if own is not None and sloped and bearing.coupling == "two-way":
         words = "Torque of the ball forces on the inner ring by the slopes of the reductions of their deflections"
         torque = names.variable("ball.sum_torque")
         sums += (names.define(torque, force * own.slope, "N*m", words, r"\textstyle\sum_j F_j e'_j"),)

@@ -106,6 +106,8 @@ class BallBuilder:
         self._further: dict[sp.Expr, ca.SX] = {}
         own = bearing.ball.own
         self.uneven = own is not None and own.slope is not None
+        # what all balls have alike may be named among the definitions of one
+        self._named = of_state.child({}, self._definitions)
         leaves = {symbol: ca.SX.sym(symbol.name) for symbol in states}
         self._of_ball = of_all(self._hoist, leaves) if self.uneven else of_state
         rings = self._relative()
@@ -120,7 +122,7 @@ class BallBuilder:
         )
         motion = self._own_motion(self._rows)
         self._further |= {s: leaf for s, leaf in leaves.items() if self.uneven and ca.depends_on(motion, leaf)}
-        expressions = [of_state(e) for e in self._further]
+        expressions = [self._named(e) for e in self._further]
         self.relative = ca.vertcat(rings, *expressions)
         #: what moves the motion of a ball, not only decides between cases
         self._live = [
@@ -136,7 +138,7 @@ class BallBuilder:
     def _hoist(self, expression: sp.Expr) -> ca.SX:
         """Entry of r behind the cage's direction, for what depends on time or state but not on the ball."""
         if not self._moves(expression):
-            return self._of_state(expression)
+            return self._named(expression)
         if expression not in self._further:
             self._further[expression] = ca.SX.sym(f"z{len(self._further)}")
         return self._further[expression]
