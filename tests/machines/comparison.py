@@ -18,7 +18,8 @@ def drawn(rng: np.random.Generator, derived: Derived, machine: Multibody) -> tup
     if machine.free:
         x[size - 1], x[-1] = machine.start + rng.uniform(-10, 10), rng.uniform(-60, 60)
     angle, _ = machine.drive(t, x)
-    return t, x, {name: machine.gate(name, angle) for name in derived.gates()}
+    spalls = derived.spall_gates(t)
+    return t, x, spalls | {name: machine.gate(name, angle) for name in derived.gates() if name not in spalls}
 
 
 def largest_difference(derived: Derived, machine: Multibody, t: float, x: np.ndarray, gates: dict[str, float]) -> float:

@@ -27,6 +27,31 @@ outer_groove_radius = "4.206875 mm"
 young_modulus = "207 GPa"
 poisson_ratio = 0.3
 ball_material = { young_modulus = "310 GPa", poisson_ratio = 0.27 }"""
+#: Every effect; balls are in spalls of each ring most of the time.
+EFFECTS = """[bearing.outer_waviness]
+7 = { amplitude = "3 um", phase = "0.4 rad" }
+[bearing.inner_waviness]
+9 = { amplitude = "2 um", phase = "0.3 rad" }
+[bearing.ball_waviness.3]
+2 = { amplitude = "2 um", phase = "0.6 rad" }
+[bearing.ball_waviness.each]
+4 = { amplitude = "1 um", phase = "1 rad" }
+[bearing.ball_deviation]
+5 = "-2 um"
+[bearing.cage]
+slip = 0.03
+"""
+SPALLS = "".join(
+    f'[bearing.defects.{name}]\non = "{on}"\n{"ball = 2" if on == "ball" else ""}\nangle = "{angle} deg"\n'
+    f'chord = "{chord} mm"\nprofile = "{profile}"\n{depth}\n'
+    for name, on, angle, chord, profile, depth in (
+        ("a", "outer", 250, 4, "path", ""),
+        ("b", "outer", 20, 3, "half-sine", 'depth = "8 um"'),
+        ("c", "inner", 120, 3, "path", 'depth = "60 um"'),
+        ("d", "inner", -70, 2, "rectangular", 'depth = "5 um"'),
+        ("e", "ball", 40, 5, "path", ""),
+    )
+)
 LAWS = (UNDAMPED, TANGENT, ONE_SIDED, GATED, HUNT)
 
 
@@ -41,6 +66,7 @@ def bearing(
     housing_damping: str = "500 N*s/m",
     balls: int = 8,
     stiffness: float | None = 8.6e9,
+    effects: str = "",
 ) -> str:
     """Tables of a bearing coupled two-way at a joint; `inner` carries the inner ring; no stiffness: from geometry."""
     name = f"bearings.at_{joint}"
@@ -64,6 +90,7 @@ ball_angle = "17 deg"
 [{name}.outer_ring]
 {support}
 {f'[{name}.inner_ring]{chr(10)}body = "{inner}"' if inner else ""}
+{effects.replace("[bearing.", f"[{name}.")}
 """
 
 
@@ -112,6 +139,8 @@ class Derived:
         self.values = {q.name: q.default for q in self.system.parameters} | dict(changes)
         self._p = np.array([self.values[q.name] for q in self.system.parameters])
         self._c = self._once(self._p)
+        constants = zip(self.system.constants, self._c.full()[:, 0], strict=False)  # more are hoisted
+        self._known = self.values | {c.symbol.name: float(v) for c, v in constants}
 
     @property
     def initial(self) -> np.ndarray:
@@ -124,7 +153,7 @@ class Derived:
             # no side of a window is held
             0.0
             if i.kind == "border"
-            else self.values[i.offset]
+            else self._known[i.offset]
             if i.kind == "phase"
             else self._slope(i, t)
             if i.kind == "table_rate"
@@ -140,6 +169,16 @@ class Derived:
 
     def gates(self, value: float = 0.0) -> dict[str, float]:
         return {i.name.removeprefix("gate."): value for i in self.system.inputs if i.kind == "gate"}
+
+    def spall_gates(self, t: float) -> dict[str, float]:
+        """Gates of spalls that balls pass evenly."""
+        known, found = self._known, {}
+        for gate in self.system.inputs:
+            if gate.kind == "gate" and "defects." in gate.name:
+                ((first, last),) = gate.windows
+                past = (known[gate.offset] + known[gate.rate] * t - known[first]) % (2 * np.pi)
+                found[gate.name.removeprefix("gate.")] = float(past < known[last] - known[first])
+        return found
 
     def rhs(self, t: float, x: np.ndarray, gates: Mapping[str, float]) -> np.ndarray:
         return self.at(t, x, gates)[0]

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from absolute import QUARTER, TURN, Absolute, Array, rotation
+from ball_effects import taken
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -25,6 +26,7 @@ from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.scene.bearing_records import Bearing, GivenContact
+from ballpass.derive.scene.records import FRAME
 
 
 @dataclass
@@ -56,18 +58,41 @@ class Multibody(Absolute):
         return 2 * self.value(motor.breakdown_torque) / (ratio + 1 / ratio)
 
     def ball_angle(self, bearing: Bearing, q: Array) -> float:
-        """Pure rolling from the ideal linkage at the start: each ring's turn with its weight."""
-        start, joint = self._chain[0][1], self.mechanism.joint(bearing.joint or "")
-        weights = self.weights(bearing)
-        bodies = (bearing.inner_body, joint.other(bearing.inner_body))
-        turned = (w * (self.angle(b, q) - self.angle(b, start)) for w, b in zip(weights, bodies, strict=True))
+        """Rolling from the ideal linkage at the start: each ring's turn with its weight."""
+        turned = (w * angle for w, angle in zip(self.weights(bearing), self.turned(bearing, q), strict=True))
         return self.value(bearing.ball_angle) + sum(turned)
 
+    def turned(self, bearing: Bearing, q: Array) -> tuple[float, float]:
+        """How far the inner and the outer ring have turned since the start."""
+        start, joint = self._chain[0][1], self.mechanism.joint(bearing.joint or "")
+        inner, outer = bearing.inner_body, joint.other(bearing.inner_body)
+        return self.angle(inner, q) - self.angle(inner, start), self.angle(outer, q) - self.angle(outer, start)
+
     def weights(self, bearing: Bearing) -> tuple[float, float]:
-        """Raceways' radii roll on the ball: R_i w_i + R_o w_o over their sum."""
+        """Raceways' radii roll on the ball: R_i w_i + R_o w_o over their sum; a cage that slips keeps less of the way
+        over the ring that stands, or the outer one."""
         ball, pitch = self.value(bearing.ball_diameter), self.value(bearing.pitch_diameter)
         inner, outer = (pitch - ball) / 2, (pitch + ball) / 2
-        return inner / (inner + outer), outer / (inner + outer)
+        kept = 1.0 - (self.value(bearing.cage.slip) if bearing.cage is not None else 0.0)
+        if bearing.inner_body == FRAME:
+            return 1.0 - kept * outer / (inner + outer), kept * outer / (inner + outer)
+        return kept * inner / (inner + outer), 1.0 - kept * inner / (inner + outer)
+
+    def taken(self, bearing: Bearing, ball: int, q: Array) -> tuple[float, float]:
+        """What effects take from the deflection of a ball, and the slope over the inner ring's angle against the outer."""
+        angle, (inner, outer) = self.ball_angle(bearing, q), self.turned(bearing, q)
+        share, step = self.weights(bearing)[0], 1e-200j
+        angle += TURN * (ball - 1) / bearing.balls
+        passed = 1 + self.value(bearing.pitch_diameter) / self.value(bearing.ball_diameter)
+        found = taken(
+            bearing,
+            self.value,
+            ball,
+            angle - outer + share * step,
+            angle - inner + (share - 1) * step,
+            passed * share * (inner - outer + step),
+        )
+        return found.real, found.imag / step.imag
 
     @cached_property
     def stiffnesses(self) -> dict[str, float]:
@@ -114,6 +139,10 @@ class Multibody(Absolute):
             along = rotation(angle + TURN * j / bearing.balls) @ np.array([1.0, 0.0])
             delta = float(apart.position @ along) - self.value(bearing.clearance) / 2
             gradient = along @ apart.jacobian + float(apart.position @ QUARTER @ along) * turn
+            if bearing.effects:
+                amount, slope = self.taken(bearing, j + 1, q)
+                against = self.row(bearing.inner_body) - self.row(joint.other(bearing.inner_body))
+                delta, gradient = delta - amount, gradient - slope * against
             yield delta, self._force(bearing, delta, float(gradient @ v)), gradient, along
 
     def _force(self, bearing: Bearing, delta: float, rate: float) -> float:

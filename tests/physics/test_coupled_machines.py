@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from comparison import drawn, largest_difference, largest_imbalance
 from coupled_scenes import (
+    EFFECTS,
+    SPALLS,
     Derived,
     bearing,
     with_bearings,
@@ -91,6 +93,22 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
             bearing("C", "rocker", elastic=True),
             bearing("D", "frame"),
         ),
+    ),
+    "press, effects": ("punching_press", (), (bearing("A", elastic=True, count=2, effects=EFFECTS + SPALLS),)),
+    "press, effects, outer ring on the crank": (
+        "punching_press",
+        (),
+        (bearing("A", "frame", effects=EFFECTS + SPALLS), bearing("B", "rod", elastic=True, effects=EFFECTS + SPALLS)),
+    ),
+    "press, effects, run-up": (
+        "punching_press",
+        (*OFF_CENTRE, (SPEED, RUN_UP)),
+        (bearing("A", elastic=True, effects=EFFECTS + SPALLS), bearing("B", "rod", effects=EFFECTS)),
+    ),
+    "press, effects, motor": (
+        "punching_press",
+        driven_by(MOTOR),
+        (bearing("A", effects=SPALLS), bearing("B", "crank", count=2, effects=EFFECTS + SPALLS)),
     ),
     "Whitworth": (
         "crank_shaper",

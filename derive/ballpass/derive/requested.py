@@ -203,6 +203,8 @@ def bearing_power_outputs(
     # where rings are loaded one-way the cage's moments have no effect
     moment = cross(apart, force)
     power = count * ((moment * ball.cage_speed if load is None else sp.S.Zero) - dot(force, parting))
+    if load is None and ball.ring_rate is not None:
+        power += count * sum(total.symbol for total in ball.sums[2:]) * ball.ring_rate
     rows.append(("cage.moment", count * moment, "N*m", f"Moment of the rings on the cage{of}, counter-clockwise"))
     rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
     if load is not None:

@@ -295,6 +295,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         models,
         errors,
         inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
+        switches=tuple(switch for cage in cages for switch in cage.switches),
         drive=drive,
         forces=forces,
         definitions=(*known, *reactions.definitions, *motion.definitions),
@@ -398,6 +399,7 @@ def _of_rings(
         [one.model for one in rings],
         errors,
         inputs=(*inputs, *(i for one in rings for i in one.cage.inputs)),
+        switches=tuple(switch for one in rings for switch in one.cage.switches),
         definitions=(*definitions, *(d for one in rings for d in one.cage.definitions)),
         constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
         quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
@@ -441,8 +443,9 @@ def _system(
     linear_forms: tuple[Definition, ...] = (),
     drive: Drive | None = None,
     forces: Forces | None = None,
+    switches: tuple[StateSwitch, ...] = (),
 ) -> System:
-    driven, switches = _driven(drive), () if forces is None else forces.switches
+    driven, switches = _driven(drive), (*(() if forces is None else forces.switches), *switches)
     if drive is not None and _driven(drive, known=True):
         mass = sp.ImmutableMatrix(sp.diag(mass, 1))
         forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([drive.acceleration])))

@@ -47,14 +47,16 @@ class StateSwitch:
     """A place of the motion at which a load switches: the load acts where `function` is above `border`.
 
     `function` is zero there, and `rate` its time derivative; the input `border` is zero, or infinite while a step holds
-    the side on which it started.  That of a window of the driver's angle names the edges, [rad]; others are sizes, in
-    [m] or [rad].
+    the side on which it started.  That of a window of an `angle` names the edges, [rad]; others are sizes, in
+    [m] or [rad], without one.  `turning` is the rate of the angle [rad/s].
     """
 
     border: Input
     function: sp.Expr
     rate: sp.Expr
     changes: str
+    angle: sp.Expr | None = None
+    turning: sp.Expr = sp.S.Zero
 
 
 def phase(name: str, description: str, latex: str, *, offset: str, rate: str) -> Input:

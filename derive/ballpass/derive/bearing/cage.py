@@ -5,20 +5,21 @@ In: a bearing and how its rings turn.  Out: a `Cage`: angle and rate of ball 1, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from ballpass.derive.bearing.cage_slip import kept_share, lag_of
 from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.drive import Drive
+from ballpass.derive.bearing.effects.effect import Passing
+from ballpass.derive.drive import Drive, OverAngle
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
-from ballpass.derive.variables import Input, phase
+from ballpass.derive.variables import Input, StateSwitch, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,10 +30,14 @@ class Cage:
     ----------
     angle, rate : of ball 1 [rad], [rad/s]
     in_outer, in_inner : angle of ball 1 as the outer and the inner ring see it, which stood along x at the start [rad]
-    inputs : the parts of these angles that grow evenly, at the reference time; none where the driver's angle is a
-        coordinate
+    inputs : the parts of these angles that grow evenly, at the reference time, none where the driver's angle is a
+        coordinate; and what effects need
     constants, definitions : of the symbols in these
     spin : angle of a ball's own material that meets the outer raceway, None where no effect asks for it [rad]
+    share : of the inner ring's speed in that of the cage, slip included; the rest is that of the outer ring's
+    ring_rate : of the inner ring relative to the outer one [rad/s]; None where effects do not need it: without any, and
+        where rings that are loaded one-way turn evenly
+    switches : places of the motion at which a ball enters or leaves a spall, where these times are not known before
     """
 
     angle: sp.Expr
@@ -41,8 +46,11 @@ class Cage:
     in_inner: sp.Expr
     inputs: tuple[Input, ...]
     constants: tuple[Definition, ...]
+    share: sp.Expr
     definitions: tuple[Definition, ...] = ()
     spin: sp.Expr | None = None
+    ring_rate: sp.Symbol | None = None
+    switches: tuple[StateSwitch, ...] = ()
 
 
 def cage_ratio(names: Names) -> sp.Symbol:
@@ -68,41 +76,55 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
         words = "speed of the balls about the bearing's axis"
         rate = ledger.define(f"{bearing.prefix}cage.rate", speed - lag.rate, "rad/s", words, names.latex(r"\dot\psi"))
     angle = even.symbol + speed * TIME - behind
-    spins = any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
-    turning = _spin(bearing, names, speed, behind) if spins else None
+    in_inner = passing.symbol + pass_speed * TIME - behind
+    turning = _spin(bearing, names, speed, -_rolls(bearing) * behind) if _spins(bearing) else None
+    passes = Passing(outer=(angle, speed), inner=(in_inner, pass_speed), even=True)
+    met = _met(bearing, names, passes)
     return Cage(
         angle=angle,
         rate=rate,
         in_outer=angle,
-        in_inner=passing.symbol + pass_speed * TIME - behind,
+        in_inner=in_inner,
         inputs=(
             even,
             passing,
-            *(() if turning is None else (turning.input,)),
+            *(() if turning is None else turning.inputs),
             *(() if lag is None else lag.inputs),
-            *(i for e in bearing.effects for i in EFFECTS[e.kind].inputs(e, bearing, names)),
+            *met.inputs,
         ),
-        constants=(
-            *constants,
-            *(() if turning is None else turning.constants),
-            *(d for e in bearing.effects for d in EFFECTS[e.kind].constants(e, bearing, names)),
-        ),
+        constants=(*constants, *(() if turning is None else turning.constants), *met.constants),
         definitions=ledger.definitions,
         spin=None if turning is None else turning.angle,
+        share=cage_ratio(names),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Spin:
     angle: sp.Expr
-    input: Input
+    rate: sp.Expr
+    inputs: tuple[Input, ...]
     constants: tuple[Definition, ...]
 
 
-def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol, behind: sp.Expr) -> _Spin:
-    """Balls that roll on the outer raceway, which stands: as much of their surface passes as of the raceway."""
+def _spins(bearing: Bearing) -> bool:
+    return any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
+
+
+def _rolls(bearing: Bearing) -> sp.Expr:
+    """Turns of a ball, seen from the cage, for one of the cage over the outer raceway, on which balls roll."""
+    return contact_cosine(bearing) + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
+
+
+def _spin(bearing: Bearing, names: Names, over_outer: sp.Expr, swung: sp.Expr) -> _Spin:
+    """Balls that roll on the outer raceway: as much of their surface passes as of the raceway.
+
+    Parameters
+    ----------
+    over_outer : mean speed of the cage over the outer ring [rad/s]
+    swung : angle that a ball turns beyond the mean [rad]
+    """
     start, speed = names.constant("spin_start"), names.constant("spin_speed")
-    rolls = contact_cosine(bearing) + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
     words = "Angle of a ball's material that meets the outer raceway"
     turned = phase(
         f"{bearing.prefix}spin",
@@ -112,18 +134,31 @@ def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol, behind: sp.Expr
         rate=speed.name,
     )
     return _Spin(
-        angle=turned.symbol + speed * TIME - rolls * behind,
-        input=turned,
+        angle=turned.symbol + speed * TIME + swung,
+        rate=speed,
+        inputs=(turned,),
         constants=(
             names.define(start, sp.S.Zero, "rad", f"{words} at the start, from which it is counted", r"\chi_{00}"),
             names.define(
                 speed,
-                rolls * cage_speed,
+                _rolls(bearing) * over_outer,
                 "rad/s",
                 "Speed of the balls about their own axes, seen from the cage",
                 r"\omega_w",
             ),
         ),
+    )
+
+
+def _met(bearing: Bearing, names: Names, passes: Passing) -> OverAngle:
+    """What effects bring besides their terms: constants, and where balls enter and leave spalls."""
+    found = [EFFECTS[e.kind].edges(e, bearing, names, passes) for e in bearing.effects]
+    return OverAngle(
+        value=sp.S.Zero,
+        constants=tuple(d for e in bearing.effects for d in EFFECTS[e.kind].constants(e, bearing, names, passes)),
+        inputs=tuple(i for one in found for i in one.inputs),
+        definitions=tuple(d for one in found for d in one.definitions),
+        switches=tuple(switch for one in found for switch in one.switches),
     )
 
 
@@ -140,8 +175,12 @@ def cage_between(
     names = Names(prefix=bearing.prefix, path=bearing.path)
     ledger = Ledger()
     driver_speed, start = symbol_of(driver.speed), symbol_of(driver.start_angle)
-    speed, ratio = names.constant("cage_speed"), cage_ratio(names)
-    weights = (ratio, 1 - ratio)
+    speed, share = names.constant("cage_speed"), cage_ratio(names)
+    constants: tuple[Definition, ...] = (_ratio(bearing, names),)
+    if bearing.cage is not None and bearing.cage.slipping:
+        slipping = _slipping(bearing, names, about_inner=swings[0] is STILL)
+        constants, share = (*constants, slipping), slipping.symbol
+    weights = (share, 1 - share)
     swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
     turns = sum((w * s.turns for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
     rate = ledger.define(
@@ -152,12 +191,10 @@ def cage_between(
         names.latex(r"\dot\psi"),
     )
     words = "Mean speed of the balls about the bearing's axis"
-    between = (swings[0].turns - swings[1].turns) * driver_speed
-    constants: tuple[Definition, ...] = (
-        _ratio(bearing, names),
+    constants += (
         names.define(
             names.constant("ring_speed"),
-            between,
+            (swings[0].turns - swings[1].turns) * driver_speed,
             "rad/s",
             "Mean speed of the inner ring relative to the outer one",
             r"\omega_{io}",
@@ -166,6 +203,7 @@ def cage_between(
     )
     inner, outer = swings
     apart = inner.swing - inner.at_start - outer.swing + outer.at_start
+    around = inner.turns - outer.turns
     free = drive.coordinate is not None
     inputs: list[Input] = []
 
@@ -176,13 +214,13 @@ def cage_between(
         inputs.append(_phase(bearing, names, part))
         return inputs[-1].symbol + names.constant(f"{part}_pass_speed" if part else "cage_speed") * TIME + swung
 
-    angle, in_outer = ball("", turns, swung), None
+    angle, in_outer, over_outer = ball("", turns, swung), None, speed
     if outer is not STILL:
-        constants += (_pass(names, "outer", ratio * names.constant("ring_speed")),)
-        in_outer = ball("outer", ratio * (inner.turns - outer.turns), ratio * apart)
-    constants += (_pass(names, "inner", (ratio - 1) * names.constant("ring_speed")),)
-    in_inner = ball("inner", (ratio - 1) * (inner.turns - outer.turns), (ratio - 1) * apart)
-    return Cage(
+        constants += (_pass(names, "outer", share * names.constant("ring_speed")),)
+        in_outer, over_outer = ball("outer", share * around, share * apart), names.constant("outer_pass_speed")
+    constants += (_pass(names, "inner", (share - 1) * names.constant("ring_speed")),)
+    in_inner = ball("inner", (share - 1) * around, (share - 1) * apart)
+    cage = Cage(
         angle=angle,
         rate=rate,
         in_outer=angle if in_outer is None else in_outer,
@@ -190,7 +228,49 @@ def cage_between(
         inputs=tuple(inputs),
         constants=constants,
         definitions=ledger.definitions,
+        share=share,
     )
+    if not bearing.effects:
+        return cage
+    relative = ledger.define(
+        f"{bearing.prefix}cage.ring_rate",
+        bodies[0].rate - bodies[1].rate,
+        "rad/s",
+        "speed of the inner ring relative to the outer one",
+        names.latex(r"\omega_{io}"),
+    )
+    rolls, spin = _rolls(bearing), None
+    if _spins(bearing):
+        spin = _spin(bearing, names, over_outer, rolls * share * apart)
+        constants += spin.constants
+        if free:
+            spin = replace(spin, angle=rolls * share * (around * (drive.angle - start) + apart), inputs=())
+    even = not free and all(one.swing == 0 for one in swings)
+    known = (over_outer, names.constant("inner_pass_speed")) if even else (share * relative, (share - 1) * relative)
+    passes = Passing(
+        outer=(cage.in_outer, known[0]),
+        inner=(in_inner, known[1]),
+        spin=None if spin is None else (spin.angle, spin.rate if even else rolls * share * relative),
+        even=even,
+    )
+    met = _met(bearing, names, passes)
+    return replace(
+        cage,
+        inputs=(*cage.inputs, *(() if spin is None else spin.inputs), *met.inputs),
+        constants=(*constants, *met.constants),
+        definitions=(*ledger.definitions, *met.definitions),
+        spin=None if spin is None else spin.angle,
+        ring_rate=relative,
+        switches=met.switches,
+    )
+
+
+def _slipping(bearing: Bearing, names: Names, *, about_inner: bool) -> Definition:
+    """Share of the inner ring's speed in that of a cage that lags: seen from the ring that stands, or the outer one."""
+    kept = kept_share(bearing)
+    share = 1 - kept * (1 - cage_ratio(names)) if about_inner else kept * cage_ratio(names)
+    words = "Share of the inner ring's speed in that of the cage, slip included"
+    return names.define(names.constant("cage_share"), share, "1", words, r"\kappa_c")
 
 
 def _pass(names: Names, ring: str, speed: sp.Expr) -> Definition:

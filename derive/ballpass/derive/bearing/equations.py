@@ -35,20 +35,24 @@ class BallRelations:
 
     Attributes
     ----------
-    cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s], constant where the coupling is one-way
+    cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s]
+    cage_share, ring_rate : see `cage.Cage`
     in_outer, in_inner : angle of ball 1 as the rings see it, see `cage.Cage` [rad]
     cos, sin : of the angle of ball j
     cosine : of the contact angle; 1 where the scene names none
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
     definitions : they use `cos` and `sin`
-    sums : symbol := sum of the expression over j, the forces along x and y
+    sums : symbol := sum of the expression over j, the forces along x and y; where bodies move with the rings, the torque
+        on the inner one by what effects take from the deflections as well
     switching : where the force of a ball has kinks
     """
 
     count: int
     cage_angle: sp.Expr
     cage_speed: sp.Symbol
+    cage_share: sp.Expr
+    ring_rate: sp.Symbol | None
     in_outer: sp.Expr
     in_inner: sp.Expr
     cos: sp.Symbol
@@ -67,7 +71,7 @@ class BallRelations:
     @property
     def ring_force(self) -> Pair:
         """Force of the inner ring on the balls, x and y: the radial part of the balls' forces [N]."""
-        sum_x, sum_y = (s.symbol for s in self.sums)
+        sum_x, sum_y = (s.symbol for s in self.sums[:2])
         return self.cosine * sum_x, self.cosine * sum_y
 
 
@@ -207,10 +211,17 @@ def _ball(
         )
         for axis, along in (("x", cos), ("y", sin))
     )
+    sloped = own is not None and any(d.symbol == own.slope and d.expression != 0 for d in own.definitions)
+    if own is not None and sloped and bearing.coupling == "two-way":
+        words = "Torque of the ball forces on the inner ring by the slopes of the reductions of their deflections"
+        torque = names.variable("ball.sum_torque")
+        sums += (names.define(torque, force * own.slope, "N*m", words, r"\textstyle\sum_j F_j e'_j"),)
     ball = BallRelations(
         count=bearing.balls,
         cage_angle=cage.angle,
         cage_speed=speed,
+        cage_share=cage.share,
+        ring_rate=cage.ring_rate,
         in_outer=cage.in_outer,
         in_inner=cage.in_inner,
         cos=cos,
@@ -234,16 +245,44 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
     """What effects take from the deflection of the generic ball; None where they take nothing."""
     if not bearing.effects:
         return None
-    still, on_inner, from_first = (sp.Function(n)(TIME) for n in ("theta", "theta_inner", "theta_first"))
+    on_outer, on_inner, from_first, spin = (
+        sp.Function(n)(TIME) for n in ("theta", "theta_inner", "theta_first", "spin")
+    )
+
+    def rate(angle: sp.Expr, share: sp.Expr) -> sp.Expr:
+        """By time where the rings turn evenly, else by the angle of the inner ring relative to the outer one."""
+        if cage.ring_rate is not None:
+            return share
+        return cage.rate - sp.diff(cage.angle - angle, TIME)
+
     axes = [
-        AngleAxes(angle=still),
-        AngleAxes(angle=on_inner, turned=cage.angle - cage.in_inner, name="inner", words=" as the inner ring sees it"),
-        AngleAxes(angle=from_first, turned=cage.angle, name="first", words=" from ball 1"),
+        AngleAxes(angle=on_outer, rate=rate(cage.in_outer, cage.share))
+        if cage.in_outer == cage.angle
+        else AngleAxes(
+            angle=on_outer,
+            rate=rate(cage.in_outer, cage.share),
+            turned=cage.angle - cage.in_outer,
+            name="outer",
+            words=" as the outer ring sees it",
+        ),
+        AngleAxes(
+            angle=on_inner,
+            rate=rate(cage.in_inner, cage.share - 1),
+            turned=cage.angle - cage.in_inner,
+            name="inner",
+            words=" as the inner ring sees it",
+        ),
+        AngleAxes(
+            angle=from_first, rate=rate(sp.S.Zero, sp.S.Zero), turned=cage.angle, name="first", words=" from ball 1"
+        ),
     ]
-    assert cage.in_outer == cage.angle  # effects are refused where the outer ring turns
-    ball = GenericBall(balls=bearing.balls, on_outer=still, on_inner=on_inner, from_first=from_first, spin=cage.spin)
+    further = {}
+    if cage.spin is not None:
+        rolls = 1 + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
+        further[spin] = cage.spin, sp.diff(cage.spin, TIME) if cage.ring_rate is None else rolls * cage.share
+    ball = GenericBall(balls=bearing.balls, on_outer=on_outer, on_inner=on_inner, from_first=from_first, spin=spin)
     taken = sum((EFFECTS[e.kind].term(e, bearing, names, ball) for e in bearing.effects), start=sp.S.Zero)
-    return own_terms(taken, axes, cos, sin, cage.rate, names) if taken != 0 else None
+    return own_terms(taken, axes, further, (cos, sin), names, cage.ring_rate) if taken != 0 else None
 
 
 def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: sp.Expr) -> RingMotion:
@@ -270,7 +309,7 @@ def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: s
         potential += half * symbol_of(outer.stiffness) * (q[2] ** 2 + q[3] ** 2)
         dissipation += half * symbol_of(outer.damping) * (v[2] ** 2 + v[3] ** 2)
     mass = sp.ImmutableMatrix(sp.hessian(kinetic, v))
-    sum_x, sum_y = (s.symbol for s in ball.sums)
+    sum_x, sum_y = (s.symbol for s in ball.sums[:2])
     forcing = []
     for k, slope in enumerate(model.gradient):
         # virtual work of the balls: -sum_j F_j d(delta_j)/d(q_k), linear in cos and sin of theta_j

@@ -1,6 +1,7 @@
 """What effects take from a ball's deflection: functions of the ball's angle and of time, with exact rates.
 
-In: an expression over angles of ball j as functions of time.  Out: `OwnTerms`, over the direction of the ball.
+In: an expression over angles of ball j as functions of time.  Where rings do not turn evenly, all these angles grow in
+proportion to that of the inner ring relative to the outer one.  Out: `OwnTerms`, over the direction of the ball.
 
 Sines and cosines of multiples of the ball's angle become products of its direction, (cos + i sin)^n by repeated
 squaring: no ball needs a sine of its own, and a compiler makes lanes of the balls.  Angles in other axes, as those of
@@ -9,7 +10,7 @@ the inner ring, have directions that follow from the ball's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -19,11 +20,16 @@ from ballpass.derive.terms import TIME, Definition, Names
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnTerms:
-    """Taken from the deflection [m], its rate [m/s] and second time derivative [m/s^2]; `definitions` name them."""
+    """Taken from the deflection [m], and its rate [m/s]; `definitions` name them and what they are made of.
+
+    Where the rings turn evenly `acceleration` is the second time derivative [m/s^2]; else `slope` is that over the
+    angle of the inner ring relative to the outer one [m/rad], which the rate is a multiple of.
+    """
 
     deflection: sp.Symbol
     rate: sp.Symbol
-    acceleration: sp.Symbol
+    acceleration: sp.Symbol | None
+    slope: sp.Symbol | None
     definitions: tuple[Definition, ...]
 
 
@@ -34,42 +40,64 @@ class AngleAxes:
     Attributes
     ----------
     angle : of ball j in them, a function of `TIME` [rad]
-    turned : how far they are turned, linear in `TIME`; zero where they stand still [rad]
+    rate : its constant derivative by time, or by the angle of the inner ring relative to the outer one
+    turned : how far they are turned [rad]; zero where they stand still
     name, words : of the axes, of their symbols and for people; empty where they stand still
     """
 
     angle: sp.Expr
+    rate: sp.Expr
     turned: sp.Expr = sp.S.Zero
     name: str = ""
     words: str = ""
 
 
 def own_terms(
-    taken: sp.Expr, several: Sequence[AngleAxes], cos: sp.Symbol, sin: sp.Symbol, speed: sp.Symbol, names: Names
+    taken: sp.Expr,
+    several: Sequence[AngleAxes],
+    further: Mapping[sp.Expr, tuple[sp.Expr, sp.Expr]],
+    direction: tuple[sp.Symbol, sp.Symbol],
+    names: Names,
+    ring_rate: sp.Symbol | None,
 ) -> OwnTerms:
-    """Terms of a ball with angles in several axes; its rate in those that stand still is `speed` [rad/s], constant."""
+    """Terms of a ball with angles in several axes.
+
+    Parameters
+    ----------
+    further : of other functions of `TIME`: what they are, and their rates, as of `AngleAxes`
+    ring_rate : of the inner ring relative to the outer one [rad/s]; None where rings turn evenly
+    """
+    angles = {axes.angle: axes.rate for axes in several} | {one: rate for one, (_, rate) in further.items()}
     steps = [taken]
-    for _ in range(2):
+    for _ in range(2 if ring_rate is None else 1):
         steps.append(sp.diff(steps[-1], TIME))
-        for axes in several:
-            rate = speed - sp.diff(axes.turned, TIME)
-            steps[-1] = steps[-1].subs(sp.diff(axes.angle, TIME), rate).doit()
-    used = [_Multiples(axes, cos, sin, names) for axes in several]
+        for angle, rate in angles.items():
+            steps[-1] = steps[-1].subs(sp.diff(angle, TIME), rate).doit()
+    steps = [e.subs({one: value for one, (value, _) in further.items()}) for e in steps]
+    used = [_Multiples(axes, *direction, names) for axes in several]
     for multiples in used:
         steps = [_over_direction(e, multiples) for e in steps]
-    symbols = [names.variable(f"ball.own_{n}") for n in ("deflection", "rate", "acceleration")]
     reduction = "reduction of the deflection of ball j, as by the waviness of a raceway"
-    words = (reduction.capitalize(), f"Rate of the {reduction}", f"Second time derivative of the {reduction}")
-    named = [
-        names.define(symbol, expression, unit, text, latex)
-        for symbol, expression, unit, text, latex in zip(
-            symbols, steps, ("m", "m/s", "m/s^2"), words, ("e_j", r"\dot e_j", r"\ddot e_j"), strict=True
-        )
-    ]
+    named: list[Definition] = []
+
+    def define(name: str, expression: sp.Expr, unit: str, words: str, latex: str) -> sp.Symbol:
+        named.append(names.define(names.variable(f"ball.own_{name}"), expression, unit, words, latex))
+        return named[-1].symbol
+
+    deflection, slope, acceleration = define("deflection", steps[0], "m", reduction.capitalize(), "e_j"), None, None
+    if ring_rate is None:
+        rate = define("rate", steps[1], "m/s", f"Rate of the {reduction}", r"\dot e_j")
+        words = f"Second time derivative of the {reduction}"
+        acceleration = define("acceleration", steps[2], "m/s^2", words, r"\ddot e_j")
+    else:
+        words = f"Slope of the {reduction}, over the angle of the inner ring relative to the outer one"
+        slope = define("slope", steps[1], "m/rad", words, "e'_j")
+        rate = define("rate", slope * ring_rate, "m/s", f"Rate of the {reduction}", r"\dot e_j")
     return OwnTerms(
-        deflection=symbols[0],
-        rate=symbols[1],
-        acceleration=symbols[2],
+        deflection=deflection,
+        rate=rate,
+        acceleration=acceleration,
+        slope=slope,
         definitions=(*(d for multiples in used for d in multiples.definitions), *named),
     )
 

@@ -5,7 +5,8 @@ loads it puts on the bodies.
 
 The inner ring moves with the body that carries it, the outer ring with the other one or, on an elastic housing, as a
 point mass of its own.  Bodies' masses contain their rings.  The balls are massless: besides the force through the
-ring's centre they turn both carriers by the cage moments, each with its share of the ball's angle.
+ring's centre they turn both carriers by the cage moments, each with its share of the ball's angle, and by the slopes of
+what effects take from their deflections: a ball that rolls up a wave turns one ring back and the other on.
 """
 
 from __future__ import annotations
@@ -80,9 +81,13 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
     apart = subtract(inner.velocity, outer.velocity)
     efforts = [Effort(amount=-f, rate=v) for f, v in zip(force, apart, strict=True)]
     efforts.append(Effort(amount=moment, rate=ball.cage_speed))
-    ratio = names.constant("cage_ratio")
+    share = ball.cage_share
     points = [body_point(mechanism, body, joint.point(body)) for body in bodies]
-    torques = [ratio * moment, (1 - ratio) * moment]
+    torques = [share * moment, (1 - share) * moment]
+    for torque in (count * total.symbol for total in ball.sums[2:]):  # of the slopes of effects, between both rings
+        assert ball.ring_rate is not None
+        efforts.append(Effort(amount=torque, rate=ball.ring_rate))
+        torques = [torques[0] + torque, torques[1] - torque]
     carried, inertias, weights = ZERO, list[Inertia](), list[Effort]()
     if bearing.outer is not None:
         housing, turning = linkage.motion(mechanism, bodies[1], joint.point(bodies[1])), linkage.pose(bodies[1]).rate

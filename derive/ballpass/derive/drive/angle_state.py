@@ -22,40 +22,8 @@ class AngleState(Drive):
 
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
         """1 where the switching function of a window is positive."""
-        edges = [self._edges(name, number, *window) for number, window in enumerate(windows, start=1)]
-        inside = [sp.Piecewise((1, edge.function > edge.border.symbol), (0, True)) for edge in edges]
-        gate = Definition(
-            symbol=sp.Symbol(f"gate.{name}", real=True),
-            expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
-            unit="1",
-            description=f"1 while {name} acts, else 0",
-            latex=rf"g_{{\mathrm{{{name}}}}}",
-        )
-        jumps = ((gate.symbol.name, Smoothness.DISCONTINUOUS),)
-        return OverAngle(
-            value=gate.symbol,
-            inputs=tuple(edge.border for edge in edges),
-            definitions=(gate,),
-            smoothness=jumps,
-            switches=tuple(edges),
-        )
-
-    def _edges(self, name: str, number: int, start: str, end: str) -> StateSwitch:
-        function, path = inside_window(start, end), f"border.{name}.{number}"
-        return StateSwitch(
-            border=Input(
-                name=path,
-                symbol=sp.Symbol(path, real=True),
-                kind="border",
-                unit="rad",
-                description=f"Border of the switching function of window {number} of {name}",
-                latex=rf"b_{{\mathrm{{{name}}},{number}}}",
-                windows=((start, end),),
-            ),
-            function=function,
-            rate=sp.diff(function, DRIVER_ANGLE) * self.speed,
-            changes=f"`gate.{name}`",
-        )
+        latex = rf"g_{{\mathrm{{{name}}}}}"
+        return window_gate(name, f"1 while {name} acts, else 0", latex, angle=(DRIVER_ANGLE, self.speed), windows=windows)
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
         """Value over the angle after the first knot, without whole periods."""
@@ -80,8 +48,58 @@ class AngleState(Drive):
         return OverAngle(value=value.symbol, definitions=(behind, value), smoothness=kinks)
 
 
-def inside_window(start: str, end: str) -> sp.Expr:
-    """Switching function of a window from one driver angle to another: positive inside, modulo a turn [rad].
+def window_gate(
+    name: str, words: str, latex: str, *, angle: tuple[sp.Expr, sp.Expr], windows: Sequence[tuple[str, str]]
+) -> OverAngle:
+    """1 where the switching function of a window of an angle is positive.
+
+    Parameters
+    ----------
+    angle : with its rate, functions of the state [rad], [rad/s]
+    windows : names of their edges
+    """
+    edges = [_edges(name, number, angle, *window) for number, window in enumerate(windows, start=1)]
+    inside = [sp.Piecewise((1, edge.function > edge.border.symbol), (0, True)) for edge in edges]
+    gate = Definition(
+        symbol=sp.Symbol(f"gate.{name}", real=True),
+        expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
+        unit="1",
+        description=words,
+        latex=latex,
+    )
+    return OverAngle(
+        value=gate.symbol,
+        inputs=tuple(edge.border for edge in edges),
+        definitions=(gate,),
+        smoothness=((gate.symbol.name, Smoothness.DISCONTINUOUS),),
+        switches=tuple(edges),
+    )
+
+
+def _edges(name: str, number: int, angle: tuple[sp.Expr, sp.Expr], start: str, end: str) -> StateSwitch:
+    path, placeholder = f"border.{name}.{number}", sp.Dummy("angle", real=True)
+    function = inside_window(placeholder, start, end)
+    slope = sp.diff(function, placeholder).xreplace({placeholder: angle[0]})
+    return StateSwitch(
+        border=Input(
+            name=path,
+            symbol=sp.Symbol(path, real=True),
+            kind="border",
+            unit="rad",
+            description=f"Border of the switching function of window {number} of {name}",
+            latex=rf"b_{{\mathrm{{{name}}},{number}}}",
+            windows=((start, end),),
+        ),
+        function=function.xreplace({placeholder: angle[0]}),
+        rate=slope * angle[1],
+        changes=f"`gate.{name}`",
+        angle=angle[0],
+        turning=angle[1],
+    )
+
+
+def inside_window(angle: sp.Expr, start: str, end: str) -> sp.Expr:
+    """Switching function of a window of an angle from one to another: positive inside, modulo a turn [rad].
 
     Its zeros are the edges: (cos(angle - middle) - cos(half)) / sin(half), half of the width; its slope there is one.
     An end before the start lies in the next turn: middle and half width are then half a turn more, which changes both
@@ -91,8 +109,8 @@ def inside_window(start: str, end: str) -> sp.Expr:
     span = last - first
     half = sp.Min(sp.Abs(span) / 2, sp.pi, evaluate=False)
     middle = (first + last) / 2
-    # cosine and sine of the angle are defined already: the driven body's
-    along = sp.cos(DRIVER_ANGLE) * sp.cos(middle) + sp.sin(DRIVER_ANGLE) * sp.sin(middle)
+    # cosine and sine of the driver's angle are defined already: the driven body's
+    along = sp.cos(angle) * sp.cos(middle) + sp.sin(angle) * sp.sin(middle)
     slope = sp.Max(sp.sin(half), LEAST_SLOPE, evaluate=False)
     return sp.sign(span, evaluate=False) * (along - sp.cos(half)) / slope
 

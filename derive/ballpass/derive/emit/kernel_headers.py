@@ -19,11 +19,12 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
-from ballpass.derive.lowering.ball_kernels import CONTACT, SUMS, BallKernels
+from ballpass.derive.lowering.ball_kernels import CONTACT, BallKernels
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
-from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS
+from ballpass.derive.lowering.ring_motion_slopes import RINGS
 from ballpass.derive.system import System
+from ballpass.derive.variables import DRIVER_ANGLE
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import ElementLife
 
@@ -63,8 +64,7 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         "BP_NJ": kernels.stage_slopes_size,
         "BP_BEARINGS": count,
         "BP_NB": sum(b.balls for b in kernels.bearings),
-        "BP_NS": SUMS * count,
-        "BP_RELATIVE": RELATIVE,
+        "BP_NS": sum(b.sums for b in kernels.bearings),
         "BP_RINGS": RINGS,
         "BP_NR": kernels.relative_size,
         "BP_NG": kernels.slopes,
@@ -92,13 +92,20 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
 def _bearing(index: int, bearings: tuple[BallKernels, ...], life: ElementLife) -> str:
     """Sizes of a bearing, its balls' directions in the cage, and its kernels, the balls in lanes."""
     own = bearings[index]
-    firsts = [0, *accumulate(b.balls for b in bearings)], [0, *accumulate(b.slopes for b in bearings)]
+
+    def first(sizes: Iterable[int]) -> int:
+        """Place of the bearing's entries behind those of the bearings before."""
+        return list(accumulate(sizes, initial=0))[index]
+
     sizes = {
         "BALLS": own.balls,
-        "FIRST_BALL": firsts[0][index],
+        "FIRST_BALL": first(b.balls for b in bearings),
         "NK": own.numbers,
+        "FIRST_RELATIVE": first(b.relative for b in bearings),
+        "SUMS": own.sums,
+        "FIRST_SUM": first(b.sums for b in bearings),
         "SLOPES": own.slopes,
-        "FIRST_SLOPE": firsts[1][index],
+        "FIRST_SLOPE": first(b.slopes for b in bearings),
         "PARTIALS": own.partials,
         **_load_powers(life),
     }
@@ -234,20 +241,18 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
         else:
             parts.append(_WITHOUT_SWITCHES.format(b=index))
     first = len(flags["of_rate"])
-    if kernels.windows is not None:
-        borders = [k for k, item in enumerate(system.inputs) if item.kind == "border" and item.windows]
-        angle = next(k for k, c in enumerate(system.coordinates) if c.kind == "angle")
-        sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": first, "BP_DRIVER": angle}
+    places = [system.inputs.index(switch.border) for switch in system.switches]
+    if kernels.windows:
+        borders = [k for k in places if system.inputs[k].windows]
+        sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": first}
         flags["has_rate"] += [1.0] * len(borders)
         for key in ("ends_above", "ends_below", "of_rate"):
             flags[key] += [0.0] * len(borders)
-        place = {parameter.name: k for k, parameter in enumerate(system.parameters)}
-        edges = [[place[system.inputs[k].windows[0][end]] for k in borders] for end in (0, 1)]
+        of_driver = [int(s.angle == DRIVER_ANGLE) for s in system.switches if s.angle is not None]
         parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders)]
-        parts += [_integers(f"bp_window_{word}", column) for word, column in zip(("start", "end"), edges, strict=True)]
-        parts.append(_single(kernels.windows))
+        parts += [_integers("bp_window_of_driver", of_driver), *map(_single, kernels.windows)]
     if kernels.stops:
-        borders = [k for k, item in enumerate(system.inputs) if item.kind == "border" and not item.windows]
+        borders = [k for k in places if not system.inputs[k].windows]
         sizes |= {"BP_STOPS": len(borders), "BP_FIRST_STOP": len(flags["of_rate"])}
         flags["has_rate"] += [1.0] * len(borders)
         for key in ("ends_above", "ends_below", "of_rate"):

@@ -4,16 +4,17 @@ In: the generic ball, and visitors of a lowering.  Out: `BallKernels`, small SX 
 
     co, si   direction of the ball
     r        delta = r0 + r1 co + r2 si - e,  d(delta)/dt = r3 co + r4 si - de/dt,  e: what effects take (own_terms);
-             r5, r6: cosine and sine of the cage's angle
+             r5, r6: cosine and sine of the cage's angle; where rings do not turn evenly, behind these what e needs of
+             the state, as the speed of the rings and the cosine and sine of the inner one's angle
     k        numbers of the ball: entries of p, c and w, gathered once by ``numbers``
 
 Each gives *rows*, summands over the balls; the C driver loops over balls (lanes), adds the rows up, and knows counts
 only:
 
 numbers   (p, c, w) -> k
-forces    -> S            F co, F si
+forces    -> S            F co, F si; F e' where effects turn bodies (own_terms)
 slopes    -> S, G         and the slopes of S: Fd cc, Fd cs, Fd ss, Fv cc, Fv cs, Fv ss; with effects the rows that
-                          time alone moves
+                          time alone moves, or, where rings do not turn evenly, all derivatives one by one
 partials  -> S, G, ...    and the derivatives of S by the ball's angle, by r0 and by k
 moved     (..., along directions of co, si, r, k) -> derivative of G
 sums_moved  (sums of the rows of partials, along directions of r, angle, k) -> derivative of S
@@ -24,7 +25,7 @@ held_forces, held_slopes  (..., b): the law with its sides held by borders b (se
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -34,8 +35,8 @@ from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS, relative_motion, ring_motion_slopes
 from ballpass.derive.lowering.visitor import Visitor
 
-#: Rows of the sums.
-SUMS = 2
+#: Rows of the sums that every bearing has.
+FORCES = 2
 
 #: Rows of `contact`.
 CONTACT = ("force", "elastic_force", "damping_force", "deflection")
@@ -57,7 +58,8 @@ class BallKernels:
     over_model : `forces`, `slopes` and `contact` over (co, si, r, p, c, w), for ensembles, where every member has
         numbers of its own; of opposite balls together where `paired`
     paired : whether the rows of `over_model`'s sums are those of a ball and of the one opposite
-    slopes, partials : rows behind S
+    sums, slopes, partials : rows of S, and behind them
+    relative : entries of r
     """
 
     prefix: str
@@ -65,8 +67,10 @@ class BallKernels:
     over_numbers: dict[str, ca.Function]
     over_model: dict[str, ca.Function]
     paired: bool
+    sums: int
     slopes: int
     partials: int
+    relative: int
 
     @property
     def numbers(self) -> int:
@@ -82,25 +86,65 @@ class BallBuilder:
     bearing : the bearing
     visit : visitor of run-time functions, which hoists constants
     of_state : visitor that hoists what depends on time alone into stage variables
+    of_all : the same with a callback for what does not depend on the ball, and with other values of the states
+    moves : whether an expression depends on time or state
+    states : symbols of the states
     """
 
-    def __init__(self, bearing: BearingModel, visit: Visitor, of_state: Visitor) -> None:
-        self.bearing, self._visit, self._of_state = bearing, visit, of_state
+    def __init__(
+        self,
+        bearing: BearingModel,
+        visit: Visitor,
+        of_state: Visitor,
+        of_all: Callable[[Callable[[sp.Expr], ca.SX], dict[sp.Symbol, ca.SX]], Visitor],
+        moves: Callable[[sp.Expr], bool],
+        states: Sequence[sp.Symbol],
+    ) -> None:
+        self.bearing, self._visit, self._of_state, self._moves = bearing, visit, of_state, moves
         self.co, self.si, self.r = ca.SX.sym("co"), ca.SX.sym("si"), ca.SX.sym("r", RINGS)
         self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
-        self.relative = self._relative()
+        self._further: dict[sp.Expr, ca.SX] = {}
+        own = bearing.ball.own
+        self.uneven = own is not None and own.slope is not None
+        # what all balls have alike may be named among the definitions of one
+        self._named = of_state.child({}, self._definitions)
+        leaves = {symbol: ca.SX.sym(symbol.name) for symbol in states}
+        self._of_ball = of_all(self._hoist, leaves) if self.uneven else of_state
+        rings = self._relative()
         co, si, r = self.co, self.si, self.r
         self._rows = self._ball(*relative_motion(r, co, si), co, si)
         # opposite balls share what their deflections are made of
         along, rate = relative_motion(ca.vertcat(0.0, r[1:]), co, si)
         self._pair = (
             (self._ball(r[0] + along, rate, co, si), self._ball(r[0] - along, -rate, -co, -si))
-            if bearing.ball.count % 2 == 0
+            if bearing.ball.count % 2 == 0 and not self.uneven
             else None
         )
+        motion = self._own_motion(self._rows)
+        self._further |= {s: leaf for s, leaf in leaves.items() if self.uneven and ca.depends_on(motion, leaf)}
+        expressions = [self._named(e) for e in self._further]
+        self.relative = ca.vertcat(rings, *expressions)
+        #: what moves the motion of a ball, not only decides between cases
+        self._live = [
+            _is_smooth_in(motion, entry) and any(_is_smooth_in(e, s) for s in ca.symvar(e))
+            for entry, e in zip(self._further.values(), expressions, strict=True)
+        ]
+
+    @staticmethod
+    def _own_motion(at: dict[str, ca.SX]) -> ca.SX:
+        """Deflection, its rate, and the slope of what effects take."""
+        return ca.vertcat(at["delta"], at["rate"], at["own_third"])
+
+    def _hoist(self, expression: sp.Expr) -> ca.SX:
+        """Entry of r behind the cage's direction, for what depends on time or state but not on the ball."""
+        if not self._moves(expression):
+            return self._named(expression)
+        if expression not in self._further:
+            self._further[expression] = ca.SX.sym(f"z{len(self._further)}")
+        return self._further[expression]
 
     def _relative(self) -> ca.SX:
-        """Coefficients r of deflection and rate, without what effects take.
+        """Coefficients of deflection and rate, without what effects take, and the direction of the cage.
 
         Raises
         ------
@@ -125,9 +169,10 @@ class BallBuilder:
         ball, nothing = self.bearing.ball, ca.SX(0.0)
         taken = [nothing] * 3
         if ball.own is not None:
-            at = self._of_state.child({ball.cos: co, ball.sin: si}, self._definitions)
+            at = self._of_ball.child({ball.cos: co, ball.sin: si}, self._definitions)
             # their expressions: where all balls are alike these are hoisted whole
-            taken = [at(self._definitions[s]) for s in (ball.own.deflection, ball.own.rate, ball.own.acceleration)]
+            third = ball.own.slope if self.uneven else ball.own.acceleration
+            taken = [at(self._definitions[s]) for s in (ball.own.deflection, ball.own.rate, third)]
             delta, rate = delta - taken[0], rate - taken[1]
         inner = (ball.deflection, ball.deflection_rate)
         rest = {k: v for k, v in self._definitions.items() if k not in inner}
@@ -144,7 +189,7 @@ class BallBuilder:
             "delta": delta,
             "rate": rate,
             "own_rate": taken[1],
-            "own_acceleration": taken[2],
+            "own_third": taken[2],
             "F": law(ball.force),
             "Fd": law(by[0]),
             "Fv": law(by[1]),
@@ -161,18 +206,80 @@ class BallBuilder:
     def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
         """Rows of G."""
         co, si = self.co, self.si
+        if self.uneven:
+            return self._every_slope(at, by_delta, by_rate)
         rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
         if self.bearing.ball.own is not None:
-            moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
+            moved = -(by_delta * at["own_rate"] + by_rate * at["own_third"])
             rows += [moved * co, moved * si]
         return rows
 
+    def _sums(self, at: dict[str, ca.SX], force: str) -> list[ca.SX]:
+        """Rows of S."""
+        rows = [at[force] * self.co, at[force] * self.si]
+        return rows + [at[force] * at["own_third"]] * (len(self.bearing.ball.sums) - FORCES)
+
+    @property
+    def _moving(self) -> tuple[ca.SX, ...]:
+        """Entries of r that move, without the direction of the cage."""
+        further = (entry for entry, live in zip(self._further.values(), self._live, strict=True) if live)
+        return (*ca.vertsplit(self.r[1:]), *further)
+
+    def _every_slope(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Derivatives of the rows of S by the moving entries of r, one after the other, then by the ball's angle.
+
+        Forces are those at hand, or those with held sides, whose slopes these are.
+        """
+        co, si = self.co, self.si
+        force = at["F"] if by_delta is at["Fd"] else at["held"]
+        motion = self._own_motion(at)
+        direction = ca.vertcat(co, si)
+        changes = [ca.jacobian(motion, entry) for entry in self._moving]
+        changes.append(ca.jtimes(motion, direction, ca.vertcat(-si, co)))
+        rows = []
+        for change in changes:
+            moved = by_delta * change[0] + by_rate * change[1]
+            rows += [moved * co, moved * si]
+            if len(self.bearing.ball.sums) > FORCES:
+                rows.append(moved * at["own_third"] + force * change[2])
+        angle = rows[-len(self.bearing.ball.sums) :]
+        return [*rows[: -len(angle)], angle[0] - force * si, angle[1] + force * co, *angle[2:]]
+
+    def by_relative(self, sums: ca.SX, totals: ca.SX, r: ca.SX) -> ca.SX:
+        """d(S)/d(r) from the sums and the totals of the slopes' rows."""
+        if not self.uneven:
+            return ring_motion_slopes().by_relative(sums, totals, r)
+        count = sums.numel()
+        columns = ca.horzsplit(ca.reshape(totals, count, totals.numel() // count))
+        turn, further = columns[-1], iter(columns[RINGS - 1 : -1])
+        return ca.horzcat(
+            ca.SX(count, 1),
+            *columns[: RINGS - 1],
+            -r[RINGS + 1] * turn,
+            r[RINGS] * turn,
+            *(next(further) if live else ca.SX(count, 1) for live in self._live),
+        )
+
+    def by_time(self, totals: ca.SX) -> ca.SX:
+        """Time derivative of S at fixed state and r: what effects take while rings turn evenly."""
+        evenly = self.bearing.ball.own is not None and not self.uneven
+        return totals[6:8] if evenly else ca.SX(len(self.bearing.ball.sums), 1)
+
+    @property
+    def slopes(self) -> int:
+        """Entries of G."""
+        if self.uneven:
+            return len(self.bearing.ball.sums) * (len(self._moving) + 1)
+        return 6 if self.bearing.ball.own is None else 8
+
     def kernels(self, c: ca.SX, p: ca.SX, w: ca.SX) -> BallKernels:
         """The functions, once the vectors of constants and stage variables are complete."""
-        co, si, r, at = self.co, self.si, self.r, self._rows
-        sums = [at["F"] * co, at["F"] * si]
+        co, si, at = self.co, self.si, self._rows
+        sums = self._sums(at, "F")
         slopes = self._slopes(at, at["Fd"], at["Fv"])
-        takes = {"co": co, "si": si, "r": r}
+        # the kernels of balls that stand in no effect's way take the rings' motion alone
+        turned = [ca.SX.sym("turned", RELATIVE - RINGS)] if self.uneven else []
+        takes = {"co": co, "si": si, "r": ca.vertcat(self.r, *turned, *self._further.values())}
         whole = {"p": p, "c": c, "w": w}
 
         def made(name: str, rows: Sequence[ca.SX], extra: dict[str, ca.SX] | None = None) -> ca.Function:
@@ -188,14 +295,14 @@ class BallBuilder:
         }
         border = {"b": at["b"]}
         if at["b"].numel():
-            held = [at["held"] * co, at["held"] * si]
+            held = self._sums(at, "held")
             own["switches"] = made("switches", [at["g"], at["g_rate"]])
             own["held_forces"] = made("held_forces", held, border)
             own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, at["held_d"], at["held_v"])], border)
         over_numbers = _over_numbers(own, len(takes))
         numbers = over_numbers["numbers"].size1_out(0)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
-        over_numbers["moved"] = _along("moved", over_numbers["slopes"], slice(SUMS, None), "G_d")
+        over_numbers["moved"] = _along("moved", over_numbers["slopes"], slice(len(sums), None), "G_d")
         if at["b"].numel():
             over_numbers["held_partials"] = _partials(
                 "held_partials", over_numbers["held_forces"], over_numbers["held_slopes"]
@@ -204,7 +311,7 @@ class BallBuilder:
                 "switches_moved", over_numbers["switches"], slice(at["g"].numel()), "g_d"
             )
         partials = over_numbers["partials"].size1_out(0)
-        over_numbers["sums_moved"] = _sums_moved(partials, numbers)
+        over_numbers["sums_moved"] = self._sums_moved(partials, numbers, len(sums), len(slopes))
         if self._pair is not None:
             one, other = self._pair
             both = [(one["F"] - other["F"]) * co, (one["F"] - other["F"]) * si]
@@ -216,9 +323,25 @@ class BallBuilder:
             over_numbers=over_numbers,
             over_model={**over_model, "contact": own["contact"]},
             paired=self._pair is not None,
+            sums=len(sums),
             slopes=len(slopes),
-            partials=partials - SUMS,
+            partials=partials - len(sums),
+            relative=self.relative.numel(),
         )
+
+    def _sums_moved(self, rows: int, numbers: int, sums: int, slopes: int) -> ca.Function:
+        """Derivative of S along directions, from the sums of the rows of `partials`."""
+        relative = self.relative.numel()
+        total, r_d, a_d, k_d = (
+            ca.SX.sym(n, m) for n, m in (("T", rows), ("r_d", relative), ("a_d", 1), ("k_d", numbers))
+        )
+        s, g = total[:sums], total[sums : sums + slopes]
+        angled, by_r0 = (total[sums * k + slopes : sums * (k + 1) + slopes] for k in (1, 2))
+        by_k = ca.reshape(total[3 * sums + slopes :], sums, numbers)
+        by_r = self.by_relative(s, g, ca.SX(relative, 1)) @ ca.vertcat(r_d[:RINGS], 0.0, 0.0, r_d[RELATIVE:])
+        moved = by_r + by_r0 * r_d[0] + angled * a_d + by_k @ k_d
+        takes = {"T": total, "r_d": r_d, "a_d": a_d, "k_d": k_d}
+        return ca.Function("sums_moved", [*takes.values()], [ca.densify(moved)], [*takes], ["S_d"])
 
     def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
         """Rows of G of a ball and of the one opposite, whose direction has the other sign."""
@@ -226,14 +349,16 @@ class BallBuilder:
         both = [at[f] + other[f] for f in ("Fd", "Fv")]
         rows = ca.vertsplit(ring_motion_slopes().summands(co, si, *both))
         if self.bearing.ball.own is not None:
-            moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_acceleration"]) for b in (at, other)]
+            moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_third"]) for b in (at, other)]
             rows += [(moved[0] - moved[1]) * co, (moved[0] - moved[1]) * si]
         return rows
 
 
-def sums_by_time(slopes: ca.SX, *, own: bool) -> ca.SX:
-    """Time derivative of S at fixed state and r: what effects take."""
-    return slopes[6:8] if own else ca.SX(SUMS, 1)
+
+
+def _is_smooth_in(value: ca.SX, symbol: ca.SX) -> bool:
+    """Whether a derivative is not zero everywhere."""
+    return bool(ca.sparsify(ca.jacobian(value, symbol)).nnz())
 
 
 def _partials(name: str, forces: ca.Function, slopes: ca.Function) -> ca.Function:
@@ -253,17 +378,6 @@ def _along(name: str, of: ca.Function, rows: slice, result: str) -> ca.Function:
     value = of.call([*given.values()], True, False)[0][rows]
     moved = ca.densify(ca.jtimes(value, ca.vertcat(*given.values()), ca.vertcat(*along.values())))
     return ca.Function(name, [*given.values(), *along.values()], ca.cse([moved]), [*given, *along], [result])
-
-
-def _sums_moved(rows: int, numbers: int) -> ca.Function:
-    """Derivative of S along directions, from the sums of the rows of `partials`."""
-    total, r_d, a_d, k_d = (ca.SX.sym(n, m) for n, m in (("T", rows), ("r_d", RELATIVE), ("a_d", 1), ("k_d", numbers)))
-    by_k = ca.reshape(total[rows - SUMS * numbers :], SUMS, numbers)
-    angle = rows - SUMS * numbers - 2 * SUMS
-    g, rings = total[SUMS:], r_d[:RINGS]
-    by_r = ring_motion_slopes().by_coefficients(g) @ rings + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
-    moved = by_r + total[angle : angle + SUMS] * a_d + by_k @ k_d
-    return ca.Function("sums_moved", [total, r_d, a_d, k_d], [ca.densify(moved)], ["T", "r_d", "a_d", "k_d"], ["S_d"])
 
 
 def _over_numbers(functions: dict[str, ca.Function], kept: int) -> dict[str, ca.Function]:

@@ -151,6 +151,12 @@ class _Lowering:
         if system.bearings:
             turned = [self.visit(bearing.ball.cage_angle) for bearing in system.bearings]
             bodies.append(("cages", {"angles": ca.vertcat(*turned)}, "angle of ball 1 of each bearing [rad]"))
+        windows = [s for s in system.switches if s.angle is not None]
+        if windows:
+            beyond = [s.angle - sp.Symbol(edge, real=True) for s in windows for edge in s.border.windows[0]]
+            turning = [s.turning for s in windows for _ in s.border.windows[0]]
+            results = {"distance": ca.vertcat(*map(self.visit, beyond)), "rate": ca.vertcat(*map(self.visit, turning))}
+            bodies.append(("windows", results, "angles beyond the edges of windows [rad], and their rates"))
         if system.linkage is not None:
             coordinates = [self.visit(e) for point in system.linkage.points for e in (point.x, point.y)]
             # of the ideal linkage: joints without play

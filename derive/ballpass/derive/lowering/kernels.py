@@ -21,21 +21,20 @@ makes SIMD lanes of the loop.  Text and compile time do not depend on their numb
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import casadi as ca
 import sympy as sp
 
 from ballpass.derive.lowering.ball_kernels import (
-    SUMS,
     BallBuilder,
     BallKernels,
     UnfitError,
-    sums_by_time,
 )
 from ballpass.derive.lowering.mass_matrix import accelerations
-from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, ring_motion_slopes
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -66,7 +65,8 @@ class Kernels:
     tangents : directional derivatives of the functions, for sensitivities
     stage_slopes : what these share for the stages, of `stage_slopes_size` entries
     bearings : kernels of the balls
-    windows : (x, p, c) -> g, rate of the windows of an angle that is a state; None without
+    windows : (t, x, u, p, c) -> g, rate of the windows of angles that are functions of the state, -> these angles and
+        edges, and -> J, derivatives of the angles by the states (row-major); none without
     stops : (t, x, u, p, c) -> g, rate of the stops, and -> J, derivatives of g by the states (row-major); none without
     """
 
@@ -80,7 +80,7 @@ class Kernels:
     tangents: tuple[Kernel, ...]
     stage_slopes: Kernel
     bearings: tuple[BallKernels, ...]
-    windows: Kernel | None = None
+    windows: tuple[Kernel, ...] = ()
     stops: tuple[Kernel, ...] = ()
 
     def __getitem__(self, name: str) -> Kernel:
@@ -122,9 +122,22 @@ class KernelBuilder:
         timed = constant | {TIME} | {i.symbol for i in system.inputs}
         self._definitions = definitions
         self._of_state = Visitor(values, definitions, constant=timed, hoist=self._hoist)
-        self._balls = [BallBuilder(bearing, visit, self._of_state) for bearing in system.bearings]
-        windows, stops = ([s for s in system.switches if bool(s.border.windows) is kind] for kind in (True, False))
-        self._windows, self._stops = ([[visit(e) for e in (s.function, s.rate)] for s in of] for of in (windows, stops))
+        steady = Visitor(values, definitions, constant=timed - {TIME})
+        states = [s.symbol for s in system.states]
+
+        def of_all(hoist: Callable[[sp.Expr], ca.SX], leaves: dict[sp.Symbol, ca.SX]) -> Visitor:
+            return Visitor({**values, **leaves}, definitions, constant=timed | frozenset(states), hoist=hoist)
+
+        self._balls = [
+            BallBuilder(bearing, visit, self._of_state, of_all, lambda e: not steady.is_constant(e), states)
+            for bearing in system.bearings
+        ]
+        self._windows = [
+            [*map(visit, (s.function, s.rate, s.angle, *(sp.Symbol(e, real=True) for e in s.border.windows[0])))]
+            for s in system.switches
+            if s.angle is not None
+        ]
+        self._stops = [[visit(e) for e in (s.function, s.rate)] for s in system.switches if s.angle is None]
         self._bodies = self._build()
 
     def _hoist(self, expression: sp.Basic) -> ca.SX:
@@ -140,9 +153,10 @@ class KernelBuilder:
         n, x, t = len(system.coordinates), self._arguments["x"], self._arguments["t"]
         bearings = system.bearings
         rings = ca.vertcat(*(b.relative for b in self._balls))
-        if ca.jacobian(rings[::RELATIVE], x).nnz():
+        if ca.jacobian(ca.vertcat(*(b.relative[0] for b in self._balls)), x).nnz():
             raise UnfitError("the part of a deflection that no direction changes is expected to be constant")
-        sums = ca.SX.sym("S", SUMS * len(bearings))
+        counts = [len(b.ball.sums) for b in bearings]
+        sums = ca.SX.sym("S", sum(counts))
         known = {s.symbol: sums[k] for k, s in enumerate(s for b in bearings for s in b.ball.sums)}
         shared = self._shared()
         held = ca.SX.sym("r", rings.numel() + len(shared))
@@ -151,22 +165,15 @@ class KernelBuilder:
         found = accelerations(system, self._of_state.child(known, definitions))
         balance = found.residual
         relative = ca.vertcat(rings, *(self._of_state(symbol) for symbol in shared))
-        sizes = [8 if b.ball.own is not None else 6 for b in bearings]
-        ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
-        g = ca.SX.sym("G", sum(sizes))
-        slopes = [g[end - size : end] for end, size in zip(ends, sizes, strict=True)]
-        by_rings = ca.diagcat(
-            *(
-                ring_motion_slopes().by_relative(
-                    sums[SUMS * k : SUMS * k + SUMS], own, held[RELATIVE * k : RELATIVE * k + RELATIVE]
-                )
-                for k, own in enumerate(slopes)
-            )
-        )
+        g = ca.SX.sym("G", sum(b.slopes for b in self._balls))
+        parts = [_parts(v, sizes) for v, sizes in (
+            (sums, counts), (g, [b.slopes for b in self._balls]), (held, [b.relative.numel() for b in self._balls])
+        )]
+        by_rings = ca.diagcat(*(b.by_relative(*of) for b, *of in zip(self._balls, *parts, strict=True)))
         by_sums = ca.jacobian(balance, sums)
         by_relative = ca.jacobian(balance, held) + by_sums @ ca.horzcat(by_rings, ca.SX(by_rings.size1(), len(shared)))
         by_state = found.solve(ca.jacobian(balance, x) + by_relative @ ca.jacobian(relative, x))
-        own_rate = ca.vertcat(*(sums_by_time(slopes[k], own=b.ball.own is not None) for k, b in enumerate(bearings)))
+        own_rate = ca.vertcat(*(b.by_time(totals) for b, totals in zip(self._balls, parts[1], strict=True)))
         w = ca.vertcat(*self._stage.values())
         wt = ca.SX.sym("wt", w.numel())
         # along one direction: the matrices above would cost four times as many operations
@@ -240,7 +247,7 @@ class KernelBuilder:
             return found
 
         balls = [b.ball for b in self._system.bearings]
-        moving = used(e for ball in balls for e in (ball.cage_angle, ball.cage_speed))
+        moving = used(e for ball in balls for e in (ball.cage_angle, ball.cage_speed, ball.ring_rate) if e is not None)
         both = moving & used([*self._system.mass, *self._system.forcing])
         return [s for s in self._definitions if s in both and used([s]) & states]
 
@@ -253,6 +260,7 @@ class KernelBuilder:
             function = ca.Function(name, [*inputs.values()], ca.cse(results), [*inputs], [*gives])
             functions.append(Kernel(function=function, description=words))
         named = {k.function.name(): k for k in functions}
+        windows = self._of_windows(c) if self._windows else ()
         tangents = tuple(_tangent(named[kernel], name, along, results) for name, kernel, along, results in _TANGENTS)
         w = ca.vertcat(*self._stage.values())
         bearings = tuple(ball.kernels(c, self._arguments["p"], w) for ball in self._balls)
@@ -265,18 +273,29 @@ class KernelBuilder:
             stage_slopes_size=stage_slopes.function.size1_out(1),
             functions=(*functions, angles, _needed(named["stage"].function, named["relative"].function, bearings)),
             turned=turned,
-            tangents=(*tangents, stage_moved),
+            tangents=(
+                *tangents,
+                stage_moved,
+                *(_tangent(k, "windows_tangent", ("t", "x", "u", "p", "c"), ("g",)) for k in windows[:1]),
+            ),
             stage_slopes=stage_slopes,
             bearings=bearings,
-            windows=self._of_windows(c) if self._windows else None,
+            windows=windows,
             stops=self._of_stops(c) if self._stops else (),
         )
 
-    def _of_windows(self, c: ca.SX) -> Kernel:
-        takes = {"x": self._arguments["x"], "p": self._arguments["p"], "c": c}
-        gives = [ca.densify(ca.vertcat(*column)) for column in zip(*self._windows, strict=True)]
-        function = ca.Function("windows", [*takes.values()], ca.cse(gives), [*takes], ["g", "rate"])
-        return Kernel(function=function, description="Switching functions of windows, and their rates")
+    def _of_windows(self, c: ca.SX) -> tuple[Kernel, Kernel, Kernel]:
+        takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
+        g, rate, *rest = (ca.densify(ca.vertcat(*column)) for column in zip(*self._windows, strict=True))
+        value = ca.Function("windows", [*takes.values()], ca.cse([g, rate]), [*takes], ["g", "rate"])
+        edges = ca.Function("window_edges", [*takes.values()], ca.cse(rest), [*takes], ["angle", "start", "end"])
+        slopes = ca.densify(ca.vec(ca.jacobian(rest[0], takes["x"]).T))
+        moved = ca.Function("windows_by_state", [*takes.values()], ca.cse([slopes]), [*takes], ["J"])
+        return (
+            Kernel(function=value, description="Switching functions of windows, and their rates"),
+            Kernel(function=edges, description="Angles of windows, and their edges"),
+            Kernel(function=moved, description="Derivatives of the angles of windows by the states"),
+        )
 
     def _of_stops(self, c: ca.SX) -> tuple[Kernel, Kernel]:
         takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
@@ -288,6 +307,12 @@ class KernelBuilder:
             Kernel(function=value, description="Switching functions of stops, and their rates"),
             Kernel(function=moved, description="Derivatives of the switching functions of stops by the states"),
         )
+
+
+def _parts(vector: ca.SX, sizes: Sequence[int]) -> list[ca.SX]:
+    """Entries of a vector, part after part."""
+    ends = list(accumulate(sizes, initial=0))
+    return [vector[first:last] for first, last in pairwise(ends)]
 
 
 def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:
@@ -302,7 +327,8 @@ def only_deflections(
     arguments = [ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())]
     w = stage(*arguments)
     rows, columns = relative.jac_sparsity(0, relative.name_in().index("w")).get_triplet()
-    needed = {column for row, column in zip(rows, columns, strict=True) if row < RELATIVE * len(bearings)}
+    deflecting = sum(bearing.relative for bearing in bearings)
+    needed = {column for row, column in zip(rows, columns, strict=True) if row < deflecting}
     for bearing in bearings:
         numbers = bearing.over_numbers["numbers"]
         needed |= {*numbers.jac_sparsity(0, numbers.name_in().index("w")).get_col()}

@@ -11,7 +11,7 @@ from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.elements import ELEMENTS, RollingElement
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_cage import read_cage
-from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_uneven
+from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body
 from ballpass.derive.reading.read_designation import fill_by_designation
 from ballpass.derive.reading.read_duty import read_lubrication
 from ballpass.derive.reading.read_fit import mounted
@@ -81,10 +81,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         support = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
         over_time = mechanism is not None and mechanism.driver.table is not None
-        uneven = "coupling two-way" if coupling == "two-way" else "mechanism.driver.table" * over_time
-        if uneven:
-            remedy = "load the bearing one-way" if coupling == "two-way" else "write speed instead of the table"
-            refuse_uneven(table, EFFECTS, "effects on the balls are", uneven, f", or {remedy}")
+        uneven = 'coupling = "two-way"' if coupling == "two-way" else "mechanism.driver.table" * over_time
         _refuse_angle(table, element)
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from ballpass.derive.reading.read_coupling import refuse_uneven
 from ballpass.derive.scene.bearing_records import CageMotion
 from ballpass.derive.scene.keys import ColumnKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, UsualRange
@@ -47,14 +46,21 @@ def read_cage(table: Table, uneven: str) -> CageMotion | None:
 
     Parameters
     ----------
-    uneven : what makes the rings turn unevenly, so that there is no slip; empty where nothing does
+    uneven : what makes the rings turn unevenly, so that slip does not change over time; empty where nothing does
     """
     if not table.has("cage"):
         return None
     with table.table("cage", "ratio or slip") as cage:
         cage.know(*keys_of(CageMotion), "jitter")
-        if uneven:
-            refuse_uneven(cage, ("slip", "jitter"), "slip of the cage is", uneven, "; ratio may stay")
+        changing = [key for key in ("slip", "jitter") if key == "jitter" or isinstance(cage.data.get(key), dict)]
+        for key in (key for key in changing if uneven and cage.has(key)):
+            cage.fault(
+                key,
+                "a slip that changes over time is modelled for rings that turn at constant speed",
+                given=f"{key} that changes, and {uneven}",
+                allowed='one number, as in slip = 0.02; or coupling = "one-way" and a driver of constant speed',
+                remedy="delete jitter" if key == "jitter" else "write the mean slip",
+            )
         if cage.has("jitter"):
             cage.data = {**cage.data, "slip": _jitter(cage)}
         if not isinstance(cage.data.get("slip"), dict):

@@ -6,7 +6,6 @@ coupling stand beside the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, InnerRing
@@ -97,16 +96,3 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
             )
             return moving[0]
         return str(body)
-
-
-def refuse_uneven(table: Table, keys: Iterable[str], what: str, because: str, remedy: str) -> None:
-    """Note a fault for each key of `what` is modelled for even rotation alone, `because` the rings turn unevenly."""
-    for key in keys:
-        if table.has(key):
-            table.fault(
-                key,
-                f"{what} modelled for rings that turn at constant speed",
-                given=f"{key}, and {because}",
-                allowed=f'{key} with coupling = "one-way" and a driver of constant speed',
-                remedy=f"delete {key}{remedy}",
-            )

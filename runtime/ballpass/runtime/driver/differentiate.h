@@ -191,34 +191,28 @@ static void tangent_end(bp_run *run, double time)
 }
 
 #if defined BALLPASS_LOCATED && defined BP_HAS_WINDOWS
-/* Parameter that is the edge of a window nearest to an angle. */
-static int nearest_edge(const bp_run *run, int window, double angle)
-{
-    const int start = bp_window_start[window], end = bp_window_end[window];
-    const double turn = 6.283185307179586476925286766559;
-    const double before = fabs(remainder(angle - run->numbers.p[start], turn)), behind = fabs(remainder(angle - run->numbers.p[end], turn));
-    return before < behind ? start : end;
-}
-
-/* The same where the driver passes edges of windows, marked to be turned: one edge after another, each with its own motion.  The driver
-   meets an edge later by (edge' - angle')/speed; its angle and speed do not jump. */
+/* The same where edges of windows are passed, marked to be turned: one edge after another, each with its own motion.  An edge is met later
+   by the change of the switching function over its rate; angles do not jump. */
 static void tangent_switch(bp_run *run, double t)
 {
     const ballpass_tangents *tangents = run->tangents;
+    const bp_numbers *n = &run->numbers;
     if (!tangents) return;
-    double before[BP_NX], behind[BP_NX];
-    bp_explicit_rate(&run->numbers, t, run->x, before);
+    double before[BP_NX], behind[BP_NX], g[BP_WINDOWS], rate[BP_WINDOWS], gd[BP_WINDOWS * BP_LANES];
+    bp_explicit_rate(n, t, run->x, before);
+    bp_windows(t, run->x, n->u, n->p, n->c, g, rate);
     for (int w = 0; w < BP_WINDOWS; w++) {
         if (!run->sides.turn[BP_FIRST_WINDOW + w]) continue;
-        const int edge = nearest_edge(run, w, run->x[BP_DRIVER]);
         run->driver.held[bp_window_input[w]] = -run->sides.border[BP_FIRST_WINDOW + w];
-        bp_explicit_rate(&run->numbers, t, run->x, behind);
+        sides_jump(run, t);
+        bp_explicit_rate(n, t, run->x, behind);
         for (long b = 0; b < tangents->blocks; b++) {
-            const double *edge_d = tangents->p + (b * BP_NP + edge) * BP_LANES;
-            double *xd = bp_tangent_state(tangents, b), later[BP_LANES];
-            for (int l = 0; l < BP_LANES; l++) later[l] = (edge_d[l] - xd[BP_DRIVER * BP_LANES + l]) / run->x[BP_NQ + BP_DRIVER];
+            bp_step_points points;
+            const bp_direction d = bp_tangent_of(tangents, run->blocks, &points, run->result->segment, b).d;
+            double *xd = bp_tangent_state(tangents, b);
+            bp_windows_tangent_lanes(t, run->x, n->u, n->p, n->c, run->blocks[b].moved, xd, d.u, d.p, d.c, gd);
             for (int k = 0; k < BP_NX; k++)
-                for (int l = 0; l < BP_LANES; l++) xd[k * BP_LANES + l] += (before[k] - behind[k]) * later[l];
+                for (int l = 0; l < BP_LANES; l++) xd[k * BP_LANES + l] -= (before[k] - behind[k]) * gd[w * BP_LANES + l] / rate[w];
         }
         memcpy(before, behind, sizeof before);
     }

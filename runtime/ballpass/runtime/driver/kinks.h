@@ -64,14 +64,14 @@ static inline void bp_switch_values(const bp_numbers *n, double t, const double 
     {                                                                                                                 \
         enum { here = BP_##b##_SWITCHES * BP_##b##_BALLS };                                                           \
         BP_BALLS(b, 2 * BP_##b##_SWITCHES + 1) /* one more: a bearing may have none */                                 \
-        bp_##b##_switches_lanes(co, si, r + BP_RELATIVE * (b), k, rows);                                                        \
+        bp_##b##_switches_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);                                                        \
         memcpy(g + BP_##b##_FIRST_EVENT, rows, here * sizeof *rows);                                                  \
         memcpy(slope + BP_##b##_FIRST_EVENT, rows + here, here * sizeof *rows);                                       \
     }
     BP_EACH_BEARING(BP_SWITCH)
 #undef BP_SWITCH
 #ifdef BP_HAS_WINDOWS
-    bp_windows(x, n->p, n->c, g + BP_FIRST_WINDOW, slope + BP_FIRST_WINDOW);
+    bp_windows(t, x, n->u, n->p, n->c, g + BP_FIRST_WINDOW, slope + BP_FIRST_WINDOW);
 #endif
 #ifdef BP_HAS_STOPS
     bp_stops(t, x, n->u, n->p, n->c, g + BP_FIRST_STOP, slope + BP_FIRST_STOP);
@@ -89,6 +89,10 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
 {
     memset(s, 0, sizeof *s);
     bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+#ifdef BP_HAS_WINDOWS
+    double turned[BP_WINDOWS * BP_NX];
+    bp_windows_by_state(t, x, n->u, n->p, n->c, turned);
+#endif
 #ifdef BP_HAS_STOPS
     double moved[BP_STOPS * BP_NX];
     bp_stops_by_state(t, x, n->u, n->p, n->c, moved);
@@ -100,10 +104,13 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
             const double of = weight[bp_of_rate[e] > 0.0 ? BP_NQ + k : k];
             least = of < least ? of : least;
         }
-#ifdef BP_HAS_WINDOWS
-        if (e >= BP_FIRST_WINDOW) least = weight[BP_DRIVER];
-#endif
         s->band[e] = BP_BAND / least;
+#ifdef BP_HAS_WINDOWS
+        if (e >= BP_FIRST_WINDOW && e < BP_FIRST_WINDOW + BP_WINDOWS) { /* of what the states turn */
+            s->band[e] = 0.0;
+            for (int k = 0; k < BP_NX; k++) s->band[e] += BP_BAND * fabs(turned[(e - BP_FIRST_WINDOW) * BP_NX + k]) / weight[k];
+        }
+#endif
 #ifdef BP_HAS_STOPS
         if (e >= BP_FIRST_STOP) { /* of what the states move; none where the drive alone does */
             s->band[e] = 0.0;
@@ -224,6 +231,15 @@ static inline void bp_turn_sides(bp_sides *s, double time, double step)
         if (s->brief[e] >= BP_CHATTER || s->still[e] >= BP_TURNS) bp_let_go(s, e);
         else bp_set_side(s, e, -s->side[e]);
     }
+}
+
+/* Sides of the balls where an effect on them begins or ends: deflections and rates jump there, and so do switching functions.  Those that
+   are about to turn by themselves do so afterwards. */
+static inline void bp_sides_jump(bp_sides *restrict s, const bp_numbers *n, double t, const double *restrict x)
+{
+    bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+    for (int e = s->first; e < BP_FIRST_LOAD; e++)
+        if (!s->turn[e] && s->side[e] * s->seen[0][e] < -s->band[e]) bp_set_side(s, e, -s->side[e]);
 }
 
 /* After an accepted step: its end is the next start, and released events return after their steps. */

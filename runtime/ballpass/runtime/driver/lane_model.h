@@ -89,12 +89,12 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
 /* A kernel of bearing b for `directions` balls (of opposite pairs one), its first rows added to S and the others to G. */
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
     for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
-        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                                 \
         bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
-        bp_member_##b##_##kernel##_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                       \
-        for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
+        bp_member_##b##_##kernel##_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                                       \
+        for (int m = 0; m < BP_##b##_SUMS; m++) BP_EACH_LANE S[(BP_##b##_FIRST_SUM + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
         for (int m = 0; m < (slopes); m++)                                                                                       \
-            BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(2 + m) * BP_L + lane];                             \
+            BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(BP_##b##_SUMS + m) * BP_L + lane];                 \
     }
 
 /* Sums over the balls of each bearing: F cos, F sin. */
@@ -173,7 +173,7 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
         bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
-        bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
+        bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                                          \
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
         if (powers) BP_LANE_POWERS(b, rows, powers > 1, first + (BP_##b##_FIRST_BALL + j) * BP_L, power + BP_POWERS * (b) * BP_L) \

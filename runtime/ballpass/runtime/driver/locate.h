@@ -206,21 +206,23 @@ static double ahead_of(double edge, double angle, double way)
 }
 
 /* Part of the step tried that passes no whole window, nor a whole gap: at its ends that would not show. */
-static double within_windows(const bp_run *run)
+static double within_windows(const bp_run *run, double t, double h)
 {
-    const double from = run->x[BP_DRIVER], way = run->next[BP_DRIVER] - from;
-    double part = 1.0;
+    const bp_numbers *n = &run->numbers;
+    double from[BP_WINDOWS], to[BP_WINDOWS], start[BP_WINDOWS], end[BP_WINDOWS], part = 1.0;
+    bp_window_edges(t + h, run->next, n->u, n->p, n->c, to, start, end);
+    bp_window_edges(t, run->x, n->u, n->p, n->c, from, start, end);
     for (int w = 0; w < BP_WINDOWS; w++) {
-        const double start = run->numbers.p[bp_window_start[w]], end = run->numbers.p[bp_window_end[w]];
-        if (start == end || fabs(end - start) >= BP_TURN) continue;
-        const double one = ahead_of(start, from, way), other = ahead_of(end, from, way);
+        const double way = to[w] - from[w];
+        if (start[w] == end[w] || fabs(end[w] - start[w]) >= BP_TURN) continue;
+        const double one = ahead_of(start[w], from[w], way), other = ahead_of(end[w], from[w], way);
         const double last = one > other ? one : other, between = 0.5 * (one + other);
         if (last < fabs(way) && between < part * fabs(way)) part = between / fabs(way);
     }
     return part;
 }
 #else
-#define within_windows(run) 1.0
+#define within_windows(run, t, h) 1.0
 #endif
 
 /* Whether the step tried changes a side.  Then it is repeated with a length that ends on the first kink, and `h` is that length; the sides
@@ -229,7 +231,7 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
 {
     bp_sides *s = &run->sides;
     ballpass_result *result = run->result;
-    for (double part = within_windows(run); part < 1.0; part = within_windows(run)) {
+    for (double part = within_windows(run, t, *h); part < 1.0; part = within_windows(run, t, *h)) {
         result->rejected++;
         *h *= part;
         set_pace(run, start, t, *h);
@@ -320,10 +322,12 @@ static void segment_inputs(bp_run *run, const double *u)
 /* Note passages of edges: a driver that returns to one at once, many times, has stalled there. */
 static void note_passages(bp_run *run, double time)
 {
-    const double speed = fabs(run->x[BP_NQ + BP_DRIVER]);
-    for (int e = BP_FIRST_WINDOW; e < BP_FIRST_WINDOW + BP_WINDOWS; e++)
-        if (run->sides.turn[e])
-            run->driver.come_back = (time - run->sides.last[e]) * speed < BP_STALL_ANGLE ? run->driver.come_back + 1 : 0;
+    double g[BP_WINDOWS], rate[BP_WINDOWS]; /* at an edge the slope over the angle is one */
+    bp_windows(time, run->x, run->numbers.u, run->numbers.p, run->numbers.c, g, rate);
+    for (int w = 0; w < BP_WINDOWS; w++)
+        if (run->sides.turn[BP_FIRST_WINDOW + w] && bp_window_of_driver[w])
+            run->driver.come_back =
+                (time - run->sides.last[BP_FIRST_WINDOW + w]) * fabs(rate[w]) < BP_STALL_ANGLE ? run->driver.come_back + 1 : 0;
 }
 
 #define start_passages(run) ((run)->driver.come_back = 0)
@@ -352,6 +356,9 @@ static void sides_here(bp_run *run)
     run->numbers.border = run->sides.border;
     hold_borders(run);
 }
+
+/* After a jump of an input, or of the gate of an effect. */
+static void sides_jump(bp_run *run, double t) { bp_sides_jump(&run->sides, &run->numbers, t, run->x); }
 
 static void sides_start(bp_run *run, double t)
 {
@@ -419,6 +426,7 @@ static int aim(bp_run *run, double t, double longest, double resolution, double 
 #define segment_inputs(run, values) ((run)->numbers.u = (values))
 #define has_stalled(run) 0
 #define sides_start(run, t) ((void)0)
+#define sides_jump(run, t) ((void)0)
 #define sides_here(run) ((void)0)
 #define sides_of_method(run) ((void)0)
 #define keep_sides(run) ((void)0)

@@ -112,7 +112,7 @@ static inline __attribute__((always_inline)) double bp_total(const double *restr
 }
 
 /* Place of the cosine of a cage's angle in the relative motion r; its sine follows. */
-#define BP_CAGE(b) (BP_RELATIVE * (b) + BP_RINGS)
+#define BP_CAGE(b) (BP_##b##_FIRST_RELATIVE + BP_RINGS)
 
 /* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine are given.  One ball a lane. */
 static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict cage, const double *restrict cage_cos,
@@ -139,17 +139,17 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
 
 /* The law of the balls, and with its slopes; where kinks are located its sides are held. */
 #ifdef BALLPASS_LOCATED
-#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
-#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
 #else
-#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
-#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
+#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
+#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
 #endif
 
-/* Sums S over the balls of each bearing: F cos, F sin. */
+/* Sums S over the balls of each bearing: F cos, F sin, and a torque where effects turn bodies. */
 static inline __attribute__((always_inline)) void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {
-#define BP_SUM(b) { BP_BALLS(b, 2) BP_FORCES(b) BP_TOTALS(b, 0, 2, S + 2 * (b)) }
+#define BP_SUM(b) { BP_BALLS(b, BP_##b##_SUMS) BP_FORCES(b) BP_TOTALS(b, 0, BP_##b##_SUMS, S + BP_##b##_FIRST_SUM) }
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM
 }
@@ -160,10 +160,10 @@ static inline void bp_sums_and_slopes(const bp_numbers *n, const double *restric
 {
 #define BP_SUM(b)                              \
     {                                          \
-        BP_BALLS(b, 2 + BP_##b##_SLOPES)       \
+        BP_BALLS(b, BP_##b##_SUMS + BP_##b##_SLOPES) \
         BP_SLOPES(b)                           \
-        BP_TOTALS(b, 0, 2, S + 2 * (b))        \
-        BP_TOTALS(b, 2, BP_##b##_SLOPES, G + BP_##b##_FIRST_SLOPE) \
+        BP_TOTALS(b, 0, BP_##b##_SUMS, S + BP_##b##_FIRST_SUM) \
+        BP_TOTALS(b, BP_##b##_SUMS, BP_##b##_SLOPES, G + BP_##b##_FIRST_SLOPE) \
     }
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM

@@ -109,7 +109,7 @@ static inline void bp_ball_quantities(const bp_numbers *n, double t, const doubl
 #define BP_CONTACT(b)                                                                                  \
     {                                                                                                  \
         BP_BALLS(b, BP_BALL_CHANNELS)                                                                  \
-        bp_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b), k, rows);                                          \
+        bp_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);                                          \
         memcpy(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, rows, sizeof rows);                         \
     }
     BP_EACH_BEARING(BP_CONTACT)

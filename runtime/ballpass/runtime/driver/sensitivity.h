@@ -303,7 +303,7 @@ static inline void bp_switch_moved(const ballpass_tangents *tangents, bp_tangent
             cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                          \
             sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                          \
         }                                                                                                                        \
-        bp_##b##_switches_moved_lanes(&co, &si, r + BP_RELATIVE * (b), k, cod, sid, rd + BP_RELATIVE * (b) * BP_LANES, kd, moved); \
+        bp_##b##_switches_moved_lanes(&co, &si, r + BP_##b##_FIRST_RELATIVE, k, cod, sid, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, kd, moved); \
         memcpy(gd, moved + which * BP_LANES, BP_LANES * sizeof *gd);                                                             \
     }
     BP_EACH_BEARING(BP_MOVED)

@@ -58,6 +58,7 @@ static void begin_segment(bp_run *run, double start, double length, double resol
     const ballpass_options *options = run->options;
     const double t = 0.0;
     if (run->step == 0.0) sides_start(run, t);
+    else if (restart) sides_jump(run, t);
     if (restart || run->step == 0.0) {
         if (changeable) {
             const int chosen = choose_method(run, t);
@@ -122,6 +123,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         turn_sides(run, start + reached, taken.tried);
     }
     sides_move_on(run);
+    if (taken.met == CUT) sides_jump(run, reached);
     if (has_stalled(run)) {
         result->time = start + reached;
         return BALLPASS_STALLED;
@@ -200,6 +202,7 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             tangent_switch(run, t);
             tangent_onset(run, t, 0);
             turn_sides(run, start + t, tried);
+            sides_jump(run, t);
             if (is_explicit(run->method)) first_slope(run, t);
             else linearize(run, t, 1);
             tangent_start(run, t);

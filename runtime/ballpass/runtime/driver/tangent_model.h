@@ -15,7 +15,7 @@ typedef double bp_vector __attribute__((vector_size(BP_LANES * sizeof(double)), 
 typedef struct {
     const double *x, *w;
     double r[BP_NR], S[BP_NS], G[BP_NG], co[BP_NB], si[BP_NB];
-#define BP_OF_BEARING(b) double k_##b[BP_##b##_NK], total_##b[2 + BP_##b##_PARTIALS];
+#define BP_OF_BEARING(b) double k_##b[BP_##b##_NK], total_##b[BP_##b##_SUMS + BP_##b##_PARTIALS];
     BP_EACH_BEARING(BP_OF_BEARING)
 #undef BP_OF_BEARING
 } bp_point;
@@ -27,9 +27,9 @@ typedef struct {
 
 /* Sums over the balls with their slopes and partial derivatives; where kinks are located the law's sides are held. */
 #ifdef BALLPASS_LOCATED
-#define BP_PARTIALS(b) bp_##b##_held_partials_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_PARTIALS(b) bp_##b##_held_partials_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
 #else
-#define BP_PARTIALS(b) bp_##b##_partials_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
+#define BP_PARTIALS(b) bp_##b##_partials_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
 #endif
 
 static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const double *restrict w, const double *restrict x)
@@ -40,11 +40,11 @@ static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const
 #define BP_POINT(b)                                                                                                              \
     {                                                                                                                            \
         const double *const r = at->r;                                                                                           \
-        BP_BALLS(b, 2 + BP_##b##_PARTIALS)                                                                                       \
+        BP_BALLS(b, BP_##b##_SUMS + BP_##b##_PARTIALS)                                                                                       \
         BP_PARTIALS(b)                                                                                                           \
-        BP_TOTALS(b, 0, 2 + BP_##b##_PARTIALS, at->total_##b)                                                                    \
-        memcpy(at->S + 2 * (b), at->total_##b, 2 * sizeof *at->S);                                                               \
-        memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + 2, BP_##b##_SLOPES * sizeof *at->G);                                \
+        BP_TOTALS(b, 0, BP_##b##_SUMS + BP_##b##_PARTIALS, at->total_##b)                                                                    \
+        memcpy(at->S + BP_##b##_FIRST_SUM, at->total_##b, BP_##b##_SUMS * sizeof *at->S);                                                               \
+        memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + BP_##b##_SUMS, BP_##b##_SLOPES * sizeof *at->G);                                \
         memcpy(at->co + BP_##b##_FIRST_BALL, co, sizeof co);                                                                     \
         memcpy(at->si + BP_##b##_FIRST_BALL, si, sizeof si);                                                                     \
         memcpy(at->k_##b, k, sizeof k);                                                                                          \
@@ -65,7 +65,7 @@ static inline void bp_sums_tangent(const bp_point *restrict at, const bp_directi
         bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
         _Pragma("omp simd")                                                                                                      \
         for (int l = 0; l < BP_LANES; l++) angle[l] = c * sd[l] - s * cd[l];                                                     \
-        bp_##b##_sums_moved_lanes(at->total_##b, rd + BP_RELATIVE * (b) * BP_LANES, angle, kd, Sd + 2 * (b) * BP_LANES);                   \
+        bp_##b##_sums_moved_lanes(at->total_##b, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, angle, kd, Sd + BP_##b##_FIRST_SUM * BP_LANES);                   \
     }
     BP_EACH_BEARING(BP_MOVED)
 #undef BP_MOVED
@@ -104,7 +104,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
                 cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                      \
                 sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                      \
             }                                                                                                                    \
-            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + BP_RELATIVE * (b), at->k_##b, cod, sid, rd + BP_RELATIVE * (b) * BP_LANES, kd,      \
+            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + BP_##b##_FIRST_RELATIVE, at->k_##b, cod, sid, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, kd,      \
                                  moved);                                                                                         \
             _Pragma("omp simd")                                                                                                  \
             for (int m = 0; m < BP_##b##_SLOPES * BP_LANES; m++) to[m] += moved[m];                                              \

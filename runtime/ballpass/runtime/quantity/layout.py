@@ -132,7 +132,7 @@ class NodeLayer:
             still=False,
             segments=segments,
             edges=make_edges(run, segments, None),
-            passages=Passages(times=np.zeros(0), edges=(), near=0.0),
+            passages=Passages(times=np.zeros(0), edges=(), columns=np.zeros(0, dtype=int), near=0.0),
             panels=None,
             plan=no_nodes(),
             track=None,

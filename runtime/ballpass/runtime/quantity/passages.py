@@ -1,20 +1,23 @@
-"""Moments at which a driver whose speed changes passes edges of windows, and how these move with the parameters.
+"""Moments at which angles that the motion decides pass edges of windows, and how these move with the parameters.
 
-In: a run along nodes.  Out: `Passages`.  A load begins or ends there: rates of states jump, and so may outputs.
+In: a run along nodes.  Out: `Passages`.  A load begins or ends there, or a ball enters a spall or leaves it: rates of
+states jump, and so may outputs.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.native.kernel import Loop
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import APART, crossings
 from ballpass.runtime.quantity.nodes import Nodes
-from ballpass.runtime.quantity.track import Track, follow
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.quantity.track import ChannelValues, Track, follow
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.resolve import Run
 
@@ -32,51 +35,68 @@ class Passages:
     Attributes
     ----------
     times : shape (passages,) [s]
-    edges : parameter that is the angle of each edge
+    edges : parameter or constant that is the angle of each edge
+    columns : place of each edge among all of the model
     near : times as near as this to one of them count as equal [s]
     """
 
     times: Array
     edges: tuple[str, ...]
+    columns: NDArray[np.int_]
     near: float
 
 
+class EdgeDistances(ChannelValues):
+    """Angles beyond the edges of all windows [rad] along tracks, and their rates [rad/s]."""
+
+    def __init__(self, model: LoadedModel) -> None:
+        super().__init__(model, ())
+        count = model.symbolic("windows").size1_out(0)
+        self._columns = [("distance", count), ("rate", count)]
+
+    def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        graph = self._model.symbolic("windows")
+        return list(graph.call([inputs[name] for name in graph.name_in()]))
+
+    def outputs_at(self, count: int, given: Mapping[str, Array]) -> dict[str, Array]:
+        """Both at points, each of shape (points, edges)."""
+        found = Loop(self._function(self._all_rows), ("t", "x", "u"))(count, given)["g"]
+        distance, rate = np.split(found, 2, axis=1)
+        return {"distance": distance, "rate": rate}
+
+
 def find_passages(run: Run, track: Track) -> Passages:
-    """Passages of all edges along a track; none where no window has an angle that is a state."""
+    """Passages of all edges along a track; none where no window has an angle that the motion decides."""
     manifest, nodes = run.model.manifest, track.nodes
     before = BEFORE * min(run.turn, run.duration)
     found: list[tuple[float, str]] = []
-    if manifest.edges and manifest.mechanism is not None:
-        driver = run.model.states.index(manifest.mechanism.angle)
+    if manifest.edges:
+        distances = EdgeDistances(run.model)
+        beyond = distances.along(track, run.numbers)["distance"].value
         for edge in dict.fromkeys(manifest.edges):
-            behind = np.sin(0.5 * (track.x[:, driver] - run.numbers.values[edge]))
+            behind = np.sin(0.5 * beyond[:, manifest.edges.index(edge)])
             found += [(time, edge) for time in crossings(nodes.t, nodes.segment, behind).tolist()]
     apart = max(APART * run.duration, 10.0 * before)
     found = [item for item in sorted(found) if np.min(np.abs(track.edges.times - item[0])) > apart]
     times = np.array([time for time, _ in found])
+    columns = np.array([manifest.edges.index(edge) for _, edge in found], dtype=int)
     if found:
         # by Newton, from the sign changes at the nodes
-        seen = _there(run, track, times)
-        angle, speed = seen.x[:, driver], seen.x[:, len(run.model.states) // 2 + driver]
-        left = [
-            math.remainder(run.numbers.values[edge] - a, driver_angle.TURN)
-            for (_, edge), a in zip(found, angle, strict=True)
-        ]
-        times = times + np.array(left) / speed - before
-    return Passages(times=times, edges=tuple(edge for _, edge in found), near=10.0 * before)
+        seen, rows = distances.along(_there(run, track, times), run.numbers), np.arange(len(found))
+        left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
+        times = times + left / seen["rate"].value[rows, columns] - before
+    return Passages(times=times, edges=tuple(edge for _, edge in found), columns=columns, near=10.0 * before)
 
 
 def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:
     """Derivatives of the times of passages along the directions, shape (passages, directions) [s/unit]."""
     if not passages.edges:
         return np.zeros((0, len(chain.names)))
-    assert run.model.manifest.mechanism is not None  # its angle passes the edges
-    driver = run.model.states.index(run.model.manifest.mechanism.angle)
     seen = _there(run, track, passages.times, chain, sensitivity_rtol)
-    # angle and speed do not jump at an edge: either side gives them
-    moved = np.array([chain.derivative(edge) for edge in passages.edges])
-    speed = seen.x[:, len(run.model.states) // 2 + driver]
-    return np.asarray((moved - seen.slope[:, driver]) / speed[:, None])
+    # angles and their rates do not jump at an edge: either side gives them
+    found, rows = EdgeDistances(run.model).along(seen, run.numbers, chain), np.arange(len(passages.edges))
+    rate = found["rate"].value[rows, passages.columns]
+    return np.asarray(-found["distance"].slope[rows, passages.columns] / rate[:, None])
 
 
 def _there(

@@ -95,8 +95,10 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     edges = [
         (abs(math.remainder(state[driver] - values[path], driver_angle.TURN)), row, path)
         for row, item in enumerate(manifest.inputs)
-        if item.kind == "border" and item.windows
-        for path in item.windows[0]
+        if item.kind == "border"
+        for window in item.windows
+        for path in window
+        if path in numbers.parameters  # the driver's; a spall's edges are derived
     ]
     _, row, path = min(edges)
     u = driver_angle.inputs_at(manifest.inputs, values, 0.0)

@@ -8,8 +8,8 @@ half-sine    depth cos(pi s/L), s along the chord from the middle
 path         the ball turns about one edge, then about the other; their circles meet at the sagitta of the ball less
              (outer raceway) or plus (inner raceway) that of the raceway; where a depth is given, not below it
 
-At constant speed all entries and exits are known before a run: each edge is a window of the angle that grows by a turn
-with every ball, and steps end on it.
+Each edge is a window of the angle that grows by a turn with every ball.  Where the rings turn evenly all entries and
+exits are known before a run; else steps end where the angle, a function of the state, passes the edge.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
 from ballpass.derive.bearing.contact_direction import contact_cosine
-from ballpass.derive.bearing.effects.effect import Effect, GenericBall
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Passing
+from ballpass.derive.drive import OverAngle
+from ballpass.derive.drive.angle_state import window_gate
 from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import ChoiceKey, WholeKey
@@ -114,11 +116,23 @@ class Defects(Effect):
     def spins(self, effect: BallEffect) -> bool:
         return any(spall.on == "ball" for spall in effect.parts)
 
-    def inputs(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Input, ...]:
-        return tuple(gate for spall in effect.parts for one in _contacts(spall, bearing, names) for gate in one.gates)
+    def edges(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> OverAngle:
+        import sympy as sp
 
-    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
-        return tuple(d for spall in effect.parts for one in _contacts(spall, bearing, names) for d in one.constants())
+        several = [one for spall in effect.parts for one in _contacts(spall, bearing, names)]
+        if passes.even:
+            return OverAngle(value=sp.S.Zero, inputs=tuple(gate for one in several for gate in one.gates))
+        found = [gate for one in several for gate in one.switched(passes)]
+        return OverAngle(
+            value=sp.S.Zero,
+            inputs=tuple(i for gate in found for i in gate.inputs),
+            definitions=tuple(d for gate in found for d in gate.definitions),
+            switches=tuple(switch for gate in found for switch in gate.switches),
+        )
+
+    def constants(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> tuple[Definition, ...]:
+        contacts = (one for spall in effect.parts for one in _contacts(spall, bearing, names))
+        return tuple(d for one in contacts for d in one.constants(passes))
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
@@ -223,6 +237,24 @@ class _SpallContact:
             for part, begin, end in self._edges
         )
 
+    def switched(self, passes: Passing) -> Iterator[OverAngle]:
+        """The same where the angle is a function of the state."""
+        if self.spall.on == "ball":
+            assert passes.spin is not None  # `spins`
+            angle, rate = passes.spin
+        else:
+            balls, seen = self.bearing.balls, passes.outer if self.ring == "outer" else passes.inner
+            angle, rate = balls * seen[0], balls * seen[1]
+        of = f" of {self.bearing.name}" if self.bearing.name else ""
+        for part, begin, end in self._edges:
+            yield window_gate(
+                f"{self.names.prefix}defects.{self._label}{part}",
+                f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}",
+                self.names.latex("g_d"),
+                angle=(angle, rate),
+                windows=[(self._symbol(begin).name, self._symbol(end).name)],
+            )
+
     @property
     def _lags(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
         """What the lag of a cage whose slip changes adds to the angle of the windows, row by row."""
@@ -246,7 +278,7 @@ class _SpallContact:
         inwards = contact_cosine(self.bearing) * ball
         return ball / 2, (pitch + inwards) / 2 if self.ring == "outer" else (pitch - inwards) / 2
 
-    def constants(self) -> Iterator[Definition]:
+    def constants(self, passes: Passing) -> Iterator[Definition]:
         """Half angle, and the edges of the windows: of a raceway's spall times the number of balls."""
         import sympy as sp
 
@@ -257,8 +289,8 @@ class _SpallContact:
         angle = sp.atan2(chord / 2, sp.sqrt(own**2 - chord**2 / 4))
         yield define(half, angle, "rad", f"Half the angle of {words}", "w_d")
         each, what = (sp.S.One, "Angle") if spall.on == "ball" else (balls, "Angle, times the number of balls,")
-        if spall.on != "ball":
-            speed = self.names.constant("cage_speed" if self.ring == "outer" else "inner_pass_speed")
+        if spall.on != "ball" and passes.even:
+            _, speed = passes.outer if self.ring == "outer" else passes.inner
             start = symbol_of(self.bearing.ball_angle)
             yield define(
                 self._symbol("passing_start"),

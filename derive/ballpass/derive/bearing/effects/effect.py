@@ -8,17 +8,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+import sympy as sp
+
+from ballpass.derive.drive import OverAngle
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Key
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names
-from ballpass.derive.variables import Input
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,10 +41,22 @@ class GenericBall:
 
     def only(self, number: int, value: sp.Expr) -> sp.Expr:
         """A value for one ball, counted from 1, and zero for the others."""
-        import sympy as sp
-
         near = sp.cos(self.from_first - 2 * sp.pi * sp.Rational(number - 1, self.balls))
         return sp.Piecewise((value, near > sp.cos(sp.pi / self.balls)), (sp.S.Zero, True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passing:
+    """How ball 1 passes over the rings, and its own material over the outer raceway: angle [rad] and its rate [rad/s].
+
+    Where all turns `even`, the rates are constants of a run, of the last row where the cage's slip changes; else they
+    and the angles are functions of the state.
+    """
+
+    outer: tuple[sp.Expr, sp.Expr]
+    inner: tuple[sp.Expr, sp.Expr]
+    spin: tuple[sp.Expr, sp.Expr] | None = None
+    even: bool
 
 
 class Effect(ABC):
@@ -74,11 +85,13 @@ class Effect(ABC):
         """Whether it depends on how the balls are turned."""
         return False
 
-    def inputs(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Input, ...]:
-        """What holds between breakpoints."""
-        return ()
+    def edges(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> OverAngle:
+        """Where it begins and ends for a ball: inputs, and definitions and switches where the motion decides."""
+        return OverAngle(value=sp.S.Zero)
 
-    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
+    def constants(
+        self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing
+    ) -> tuple[Definition, ...]:
         """Derived constants of its own."""
         return ()
 
