@@ -34,6 +34,7 @@ class Option:
     unit : of a quantity, which the command line takes as text with a unit; empty for other options
     least, above, most : bounds of a number
     choices : allowed words; empty for any
+    behind_scene : whether it stands behind the scene on the command line, without a flag
     """
 
     words: str
@@ -45,9 +46,12 @@ class Option:
     above: float = -math.inf
     most: float = math.inf
     choices: tuple[str, ...] = ()
+    behind_scene: bool = False
 
     def flag(self, name: str) -> str:
-        """Flag of a parameter on the command line."""
+        """Flag of a parameter on the command line; its placeholder where it has none."""
+        if self.behind_scene:
+            return self.shown or name
         return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
 
     def help(self, name: str) -> str:
