@@ -53,6 +53,12 @@ class ParameterRange:
             return float(self.low * (self.high / self.low) ** share)
         return self.low + share * (self.high - self.low)
 
+    def share_of(self, value: float) -> float:
+        """How far a value lies on the way; beyond 0 and 1 where it lies outside."""
+        if self.logarithmic:
+            return float(np.log(max(value, 1e-300) / self.low) / np.log(self.high / self.low))
+        return (value - self.low) / (self.high - self.low)
+
     def slope(self, share: float) -> float:
         """Derivative of that value by the share."""
         if self.logarithmic:

@@ -35,6 +35,7 @@ class Option:
     least, above, most : bounds of a number
     choices : allowed words; empty for any
     reader : of a record, which the command line takes as text
+    behind_scene : whether it stands behind the scene on the command line, without a flag
     """
 
     words: str
@@ -47,9 +48,12 @@ class Option:
     most: float = math.inf
     choices: tuple[str, ...] = ()
     reader: Callable[[str], Any] | None = None
+    behind_scene: bool = False
 
     def flag(self, name: str) -> str:
-        """Flag of a parameter on the command line."""
+        """Flag of a parameter on the command line; its placeholder where it has none."""
+        if self.behind_scene:
+            return self.shown or name
         return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
 
     def help(self, name: str) -> str:

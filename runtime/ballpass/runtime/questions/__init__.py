@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ballpass.runtime.questions.bifurcation import bifurcation
+from ballpass.runtime.questions.fit import fit
 from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
@@ -21,6 +22,7 @@ class Questions:
 
     bifurcation = bifurcation
     checked_jacobian = checked_jacobian
+    fit = fit
     life = life
     linearize = linearize
     optimize = optimize

@@ -125,6 +125,9 @@ def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> in
         kind = list[str] if required else list[str] | None
     elif option.unit or option.reader:
         kind = str if required else str | None
+    if option.behind_scene:
+        argument = typer.Argument(metavar=option.shown, help=option.words, show_default=False)
+        return parameter.replace(annotation=Annotated[kind, argument])
     flags = option.flags or (option.flag(parameter.name),)
     info = typer.Option(*flags, metavar=option.shown, help=option.help(parameter.name))
     return parameter.replace(annotation=Annotated[kind, info])

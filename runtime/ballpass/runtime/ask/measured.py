@@ -1,0 +1,199 @@
+"""Measured signals of a trial, from a CSV or NetCDF file or from arrays.
+
+In: a path or a mapping, a manifest, names of columns by output.  Out: a `Trial`, SI.
+
+A CSV file's first line names its columns, with a unit in brackets where it is not SI: ``time [ms],outer.y [um]``.  The
+first column is the time.  A line ``# PATH = VALUE`` says a number of the scene in this trial alone; other lines that
+begin with ``#`` are left out.  A NetCDF file has a variable ``time``, units in attributes, and numbers of the trial in
+attributes of its own.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
+
+#: Largest CSV file [bytes].
+LARGEST = 500_000_000
+
+#: Fewest samples of a signal.
+FEWEST = 8
+
+#: Measured signals as callers give them.
+Source = str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trial:
+    """Signals of one measurement.
+
+    Attributes
+    ----------
+    name : of the file, or the number of the trial
+    t : times of the samples as they were recorded, shape (samples,) [s]
+    signals : by output, NaN for what is missing, each of shape (samples,) [output's unit]
+    parameters : numbers of the scene in this trial alone, SI
+    """
+
+    name: str
+    t: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    parameters: Mapping[str, float]
+
+
+def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], number: int) -> Trial:
+    """Read the signals of a trial.
+
+    Parameters
+    ----------
+    source : path of a file, or a mapping with ``time``, columns by name, and numbers of the scene by name, all SI
+    columns : column by output; where there is none, all columns that are named as outputs are taken
+    number : of the trial, from 1 on, as the name of a mapping
+
+    Raises
+    ------
+    RequestError
+        No such file or column, another format, times that do not increase, or too few samples.
+    """
+    numbers: dict[str, float] = {}
+    if isinstance(source, str | Path):
+        name = Path(source).name
+        table, said = _netcdf(source) if name.endswith(".nc") else _csv(source)
+        infos = {info.name: info for info in manifest.parameters}
+        for key, text in said.items():
+            if key in infos:
+                numbers[key] = _quantity(f"{name}, {key}", text, infos[key].unit)
+    else:
+        name, table = f"trial {number}", {}
+        known = {info.name for info in manifest.parameters}
+        for key in source:
+            if key in known:
+                numbers[key] = float(source[key])
+            else:
+                table[str(key)] = (np.asarray(source[key], dtype=float), "")
+    return _trial(manifest, name, table, columns, numbers)
+
+
+def _trial(
+    manifest: Manifest,
+    name: str,
+    table: Mapping[str, tuple[np.ndarray, str]],
+    columns: Mapping[str, str],
+    numbers: Mapping[str, float],
+) -> Trial:
+    infos = {info.name: info for info in (*manifest.states, *manifest.outputs) if getattr(info, "size", 1) == 1}
+    chosen = dict(columns) or {key: key for key in table if key in infos}
+    faults = [unknown_name("output or state with one value", key, infos) for key in chosen if key not in infos]
+    faults += [unknown_name(f"column of {name}", column, table) for column in chosen.values() if column not in table]
+    if "time" not in table:
+        faults.append(f"{name} has no time. Allowed: a variable `time`; the first column of a CSV file.")
+    if not chosen:
+        faults.append(
+            f"{name}: none of its columns ({', '.join(table) or 'none'}) is an output of the scene. Name them so, or "
+            'say which is which: "outer.y=COLUMN" (--signal).'
+        )
+    if faults:
+        raise RequestError("\n".join(faults))
+    t = _in_si(f"{name}, time", *table["time"], "s")
+    found = {key: _in_si(f"{name}, {column}", *table[column], infos[key].unit) for key, column in chosen.items()}
+    if t.ndim != 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0.0):
+        raise RequestError(
+            f"{name}: its times do not increase throughout. Allowed: increasing finite times. Sort them."
+        )
+    for key, values in found.items():
+        if values.shape != t.shape:
+            raise RequestError(f"{name}, {key}: {values.shape} values for {len(t)} times. Give one for each.")
+        if np.count_nonzero(np.isfinite(values)) < FEWEST or np.nanstd(values) == 0.0:
+            raise RequestError(f"{name}, {key}: allowed are signals of {FEWEST} samples or more that are not constant.")
+    return Trial(name=name, t=t, signals=found, parameters=dict(numbers))
+
+
+def _in_si(what: str, values: np.ndarray, unit: str, wanted: str) -> np.ndarray:
+    """Values in the output's unit; without a unit they are."""
+    return values if unit in ("", wanted) else values * _quantity(what, f"1 {unit}", wanted)
+
+
+def _quantity(what: str, text: str, unit: str) -> float:
+    try:
+        return parse_quantity(text, unit)
+    except QuantityError as error:
+        raise RequestError(f"{what}: {error}") from None
+
+
+def _csv(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, str]]:
+    """Columns with their units, and assignments in comments."""
+    try:
+        text = read_file(path, LARGEST).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        raise RequestError(f"{path}: cannot be read: {why}. Allowed: a CSV file, or NetCDF (.nc).") from None
+    lines = [line for line in text.splitlines() if line.strip()]
+    said = dict(_assigned(line) for line in lines if line.startswith("#") and "=" in line)
+    rows = [line for line in lines if not line.startswith("#")]
+    heads = [_head(cell) for cell in next(csv.reader(rows[:1]), [])]
+    try:
+        values = np.loadtxt(rows[1:], delimiter=",", ndmin=2, converters=lambda cell: float(cell.strip() or "nan"))
+    except ValueError as error:
+        raise RequestError(f"{path}: {error}. Allowed: numbers with commas between, below a line of names.") from None
+    if not heads or values.shape[1:] != (len(heads),):
+        raise RequestError(f"{path}: {len(heads)} names for {values.shape[-1]} columns. Name each in the first line.")
+    table = {name: (column, unit) for (name, unit), column in zip(heads, values.T, strict=True)}
+    return {"time": (values[:, 0], heads[0][1])} | table, said
+
+
+def _assigned(line: str) -> tuple[str, str]:
+    name, _, value = line.lstrip("# ").partition("=")
+    return name.strip(), value.strip()
+
+
+def _head(cell: str) -> tuple[str, str]:
+    """Name of a column, and its unit from brackets behind it."""
+    name, _, unit = cell.strip().rstrip("]").partition("[")
+    return name.strip(), unit.strip()
+
+
+def _netcdf(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, str]]:
+    """Variables of one dimension with their units, and attributes that are texts."""
+    import h5netcdf
+
+    try:
+        stored = h5netcdf.File(path, "r")
+    except (OSError, ValueError) as error:
+        why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"
+        raise RequestError(f"{path}: cannot be read: {why}. Allowed: NetCDF-4, or a CSV file.") from None
+    with stored:
+        table = {
+            name: (np.asarray(item[...], dtype=float), str(item.attrs.get("units", "")))
+            for name, item in stored.variables.items()
+            if item.ndim == 1 and item.dtype.kind in "fiu"
+        }
+        said = {name: value for name, value in stored.attrs.items() if isinstance(value, str)}
+    return table, said
+
+
+def read_columns(signals: str | Sequence[str] | None) -> dict[str, str]:
+    """Columns by output from texts such as ``outer.y=outer_y_m``.
+
+    Raises
+    ------
+    RequestError
+        Another form.
+    """
+    found = {}
+    for text in [signals] if isinstance(signals, str) else list(signals or []):
+        output, equals, column = (part.strip() for part in text.partition("="))
+        if not equals or not output or not column:
+            raise RequestError(f'signal: {text!r:.80} has another form. Allowed: "OUTPUT=COLUMN", as outer.y=accel_3.')
+        found[output] = column
+    return found

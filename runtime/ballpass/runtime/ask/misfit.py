@@ -1,0 +1,269 @@
+"""Differences between a model's outputs and measured signals, with their exact derivatives by all unknowns.
+
+In: a model, trials, unknowns.  Out: `Misfit`, which gives differences and Jacobian as `scipy.optimize.least_squares`
+takes them.
+
+Unknowns are counted so that each is about one: parameters and shifts of time in shares of their ranges, gains by
+themselves, offsets in deviations of their signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ballpass.runtime.ask.measured import Trial
+from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.defaults import SENSITIVITY
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.quantity.nodes import Nodes, make_edges
+from ballpass.runtime.quantity.track import ChannelValues, follow
+from ballpass.runtime.run.directions import Chain
+from ballpass.runtime.run.locating import kinks_with_derivatives
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.segments import joined_segments, run_windows
+
+#: Kinds of unknowns that belong to the measurement, not to the machine.
+NUISANCES = ("shift", "gain", "offset")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unknown:
+    """A number to find.
+
+    Attributes
+    ----------
+    name, unit : for people; the unit is SI
+    kind : ``parameter``, ``shift``, ``gain`` or ``offset``
+    range : of a parameter or a shift; None for others, which have no bounds
+    size : of an offset, the deviation of its signal [unit]
+    record : place of the trial of a shift, or of the signal of a gain or offset
+    """
+
+    name: str
+    unit: str
+    kind: str
+    range: ParameterRange | None = None
+    size: float = 1.0
+    record: int = 0
+
+    @property
+    def relative(self) -> bool:
+        """Whether its changes are counted in shares of it: it cannot be zero."""
+        if self.kind == "parameter" and self.range is not None:
+            return self.range.low * self.range.high > 0.0
+        return self.kind == "gain"
+
+    def value(self, count: float) -> float:
+        """The number that is counted so [unit]."""
+        return self.range.at(count) if self.range is not None else self.size * count
+
+    def slope(self, count: float) -> float:
+        """Its derivative by the count."""
+        return self.range.slope(count) if self.range is not None else self.size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Record:
+    """A signal of a trial, without the samples that are missing.
+
+    Attributes
+    ----------
+    name : of the trial and the output
+    output, unit : what was measured
+    trial : place of the trial
+    kept : which of its samples there are, shape (samples,)
+    t, values : times as recorded [s] and samples, of the same shape
+    """
+
+    name: str
+    output: str
+    unit: str
+    trial: int
+    kept: np.ndarray
+    t: np.ndarray
+    values: np.ndarray
+
+
+class Misfit:
+    """Differences of outputs from measured signals.
+
+    Parameters
+    ----------
+    model : the model
+    trials : measured signals
+    ranges : of the parameters to find
+    begin : time of the run at the data's time zero [s]
+    shift : range of an unknown shift of each trial's time; None for none
+    gain, offset : whether each signal has an unknown one
+    parameters : overrides of other parameters, SI
+    rtol : tolerance of the runs [1]
+
+    Attributes
+    ----------
+    records, unknowns : in the order of differences and counts
+    ranges : of the parameters
+
+    Raises
+    ------
+    RequestError
+        Times before the run's start, or numbers that a trial sets although they are to be found.
+    """
+
+    def __init__(
+        self,
+        model: LoadedModel,
+        trials: Sequence[Trial],
+        ranges: Sequence[ParameterRange],
+        *,
+        begin: float,
+        shift: ParameterRange | None,
+        gain: bool,
+        offset: bool,
+        parameters: Mapping[str, float],
+        rtol: float,
+    ) -> None:
+        self._model, self._trials, self.ranges, self._rtol = model, trials, tuple(ranges), rtol
+        self._begin, self._fixed, self._shifted = begin, dict(parameters), shift is not None
+        units = {info.name: info.unit for info in (*model.manifest.states, *model.manifest.outputs)}
+        self.records = tuple(
+            Record(
+                name=f"{output} of {trial.name}",
+                output=output,
+                unit=units[output],
+                trial=k,
+                kept=np.isfinite(values),
+                t=trial.t[np.isfinite(values)],
+                values=values[np.isfinite(values)],
+            )
+            for k, trial in enumerate(trials)
+            for output, values in trial.signals.items()
+        )
+        ends = (0.0,) if shift is None else (0.0, shift.low, shift.high)
+        self._after = max(ends)
+        for trial in trials:
+            first = begin + float(trial.t[0]) + min(ends)
+            if first < 0.0:
+                raise RequestError(
+                    f"{trial.name}: its first sample is at {first:g} s of the run, which starts at 0 s. Say at which "
+                    "time of the run the data's time is zero (--begin)."
+                )
+            twice = [one.name for one in ranges if one.name in trial.parameters]
+            if twice:
+                raise RequestError(f"{trial.name} sets {', '.join(twice)}, which are to be found. Leave them away.")
+        found = [Unknown(name=one.name, unit=one.unit, kind="parameter", range=one) for one in ranges]
+        if shift is not None:
+            found += [
+                Unknown(name=f"time shift of {trial.name}", unit="s", kind="shift", range=shift, record=k)
+                for k, trial in enumerate(trials)
+            ]
+        for k, record in enumerate(self.records):
+            if gain:
+                found.append(Unknown(name=f"gain of {record.name}", unit="1", kind="gain", record=k))
+            if offset:
+                size = float(np.std(record.values))
+                name = f"offset of {record.name}"
+                found.append(Unknown(name=name, unit=record.unit, kind="offset", size=size, record=k))
+        self.unknowns = tuple(found)
+        self._place = {(one.kind, one.record): k for k, one in enumerate(found) if one.kind != "parameter"}
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the counts."""
+        low = [0.0 if one.range is not None else -np.inf for one in self.unknowns]
+        return np.array(low), np.array([1.0 if one.range is not None else np.inf for one in self.unknowns])
+
+    def values(self, counts: np.ndarray) -> np.ndarray:
+        """Numbers that are counted so, SI."""
+        return np.array([one.value(float(c)) for one, c in zip(self.unknowns, counts, strict=True)])
+
+    def start(self, shares: np.ndarray) -> np.ndarray:
+        """Counts to start at, from those of the parameters; shifts and offsets are nearest to zero, gains one."""
+        counts = []
+        for one in self.unknowns[len(shares) :]:
+            share = one.range.share_of(0.0) if one.range is not None else 1.0 if one.kind == "gain" else 0.0
+            counts.append(min(max(share, 0.05), 0.95) if one.range is not None else share)
+        return np.array([*shares, *counts])
+
+    def runs(self, counts: np.ndarray) -> list[tuple[Numbers, float]]:
+        """Numbers and length [s] of each trial's run."""
+        return [self._numbers(k, self.values(counts)) for k in range(len(self._trials))]
+
+    def _numbers(self, place: int, values: np.ndarray) -> tuple[Numbers, float]:
+        trial = self._trials[place]
+        found = {one.name: float(value) for one, value in zip(self.ranges, values, strict=False)}
+        # of one length for all shifts, so that its steps are the same
+        length = self._begin + float(trial.t[-1]) + self._after
+        return self._model.numbers(self._fixed | dict(trial.parameters) | found), length
+
+    def outputs(self, counts: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each record the model's samples, shape (samples,), and their derivatives by the counts.
+
+        Raises
+        ------
+        RequestError
+            Parameters that cannot be simulated.
+        SimulationError
+            A run failed.
+        """
+        values = self.values(counts)
+        slopes = [one.slope(float(c)) for one, c in zip(self.unknowns, counts, strict=True)]
+        shifts = [values[self._place.get(("shift", k), -1)] if self._shifted else 0.0 for k in range(len(self._trials))]
+        runs = [self._run(k, values, float(shift)) for k, shift in enumerate(shifts)]
+        names = len(self.ranges)
+        found = []
+        for place, record in enumerate(self.records):
+            plain, by_parameters, by_time = (part[record.kept] for part in runs[record.trial][record.output])
+            at = {kind: self._place.get((kind, record.trial if kind == "shift" else place)) for kind in NUISANCES}
+            gain = 1.0 if at["gain"] is None else values[at["gain"]]
+            y, jacobian = gain * plain, np.zeros((len(plain), len(values)))
+            jacobian[:, :names] = gain * by_parameters * slopes[:names]
+            if at["shift"] is not None:
+                jacobian[:, at["shift"]] = gain * by_time * slopes[at["shift"]]
+            if at["gain"] is not None:
+                jacobian[:, at["gain"]] = plain
+            if at["offset"] is not None:
+                y = y + values[at["offset"]]
+                jacobian[:, at["offset"]] = slopes[at["offset"]]
+            found.append((y, jacobian))
+        return found
+
+    def _run(
+        self, place: int, values: np.ndarray, shift: float
+    ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Samples of a trial by output, with derivatives by the parameters and by time."""
+        model, trial, names = self._model, self._trials[place], [one.name for one in self.ranges]
+        numbers, length = self._numbers(place, values)
+        check_assembly(model, numbers)
+        run = resolve(model, numbers, Request(rtol=self._rtol, transient_cycles=0.0), duration=length)
+        run = replace(run, kinks=kinks_with_derivatives(None, model.manifest))
+        windows = run_windows(model, numbers, (run.begin, run.end), run.turn, run.start)
+        (segments,) = joined_segments(windows, all_=True)
+        # the first parameter once more, at times that move by one: the difference to it is the derivative by time
+        chain = Chain(model, numbers, [*names, names[0]])
+        t = self._begin + trial.t + shift
+        moving = np.zeros((len(t), len(names) + 1))
+        moving[:, -1] = 1.0
+        nodes = Nodes(
+            t=t,
+            weight=np.zeros(len(t)),
+            segment=np.zeros(len(t), dtype=np.int_),
+            fraction=np.full(len(t), np.nan),
+            held=np.clip(np.searchsorted(segments.times, t, side="right") - 1, 0, len(segments.times) - 2),
+            slope=moving,
+            weight_slope=np.zeros_like(moving),
+        )
+        edges = make_edges(run, segments, None)
+        track = follow(run, segments, edges, nodes, chain, SENSITIVITY * self._rtol, still=not model.states)
+        signals = ChannelValues(model, list(trial.signals)).along(track, numbers, chain)
+        found = {}
+        for name, signal in signals.items():
+            slope = signal.slope[:, 0]
+            found[name] = (signal.value[:, 0], slope[:, :-1], slope[:, -1] - slope[:, 0])
+        return found

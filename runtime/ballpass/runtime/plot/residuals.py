@@ -1,0 +1,56 @@
+"""A measured signal, the fitted model, and what is left: differences over time, and their correlation.
+
+In: samples.  Out: a figure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ballpass.runtime.plot.style import FIRST, GREY, INK, SIGNAL, caption, label, new_figure, styled
+
+#: Lags of the correlation that are shown.
+LAGS = 60
+
+
+@styled
+def draw_residuals(
+    name: str, unit: str, noise: float, t: np.ndarray, measured: np.ndarray, model: np.ndarray
+) -> Figure:
+    """Signal above, differences over noise below, their correlation at the right.
+
+    Parameters
+    ----------
+    noise : deviation of the differences
+    """
+    figure = new_figure(5.2)
+    panels = figure.subplot_mosaic([["signal", "signal"], ["left", "correlation"]], width_ratios=(2.0, 1.0))
+    above, below, beside = panels["signal"], panels["left"], panels["correlation"]
+    above.plot(t, measured, ".", color=GREY, markersize=2.0, label="measured", rasterized=True)
+    above.plot(t, model, **{**FIRST, "linewidth": 0.9}, label="model")
+    above.set_xlabel(label("time", "s"))
+    above.set_ylabel(label(name, unit))
+    above.legend(loc="upper right")
+    left = (model - measured) / noise
+    below.plot(t, left, ".", color=INK, markersize=2.0, rasterized=True)
+    for level in (-1.96, 1.96):
+        below.axhline(level, color=SIGNAL, linewidth=1.0, linestyle=(0, (5, 2)))
+    below.set_xlabel(label("time", "s"))
+    below.set_ylabel("difference over noise")
+    away = left - np.mean(left)
+    lags = min(LAGS, len(away) - 1)
+    found = [np.sum(away[lag:] * away[: len(away) - lag]) / np.sum(away**2) for lag in range(1, lags + 1)]
+    beside.vlines(np.arange(1, lags + 1), 0.0, found, color=INK, linewidth=1.2)
+    edge = 1.96 / np.sqrt(len(away))
+    beside.axhspan(-edge, edge, color=SIGNAL, alpha=0.2, linewidth=0)
+    largest = max(0.2, 1.1 * float(np.max(np.abs(found))))
+    beside.set_ylim(-largest, largest)
+    beside.set_xlabel("lag, samples")
+    beside.set_ylabel("correlation")
+    caption(
+        figure,
+        f"Fit to {name}",
+        "Of white noise 95 % of differences lie between the dashed lines, 95 % of correlations in the band.",
+    )
+    return figure

@@ -1,0 +1,529 @@
+"""Parameters from measured signals: values with intervals, and in words what the data do not determine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Option, Rtol
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.fitting import Fitted
+    from ballpass.runtime.ask.misfit import Misfit
+    from ballpass.runtime.ask.parameter_range import ParameterRange
+
+#: Distance of each start from the bounds, in shares of the range [1].
+INSIDE = 0.05
+
+#: Tolerance of the runs where none is given [1].
+DEFAULT_RTOL = 1e-9
+
+#: Correlation of two unknowns from which on the report names it.
+CORRELATED = 0.9
+
+Data = Annotated[
+    str | Path | Mapping[str, Any] | Sequence[Any],
+    Option(words="Files of measured signals: CSV or NetCDF, one for each trial.", shown="DATA", behind_scene=True),
+]
+Vary = Annotated[
+    str | Sequence[str],
+    Option(
+        words="Parameter to find and its bounds; `:log` behind them for equal factors. May be repeated.",
+        shown="PATH=A:B",
+        example='bearing.clearance="5 um:30 um"',
+    ),
+]
+Signals = Annotated[
+    str | Sequence[str] | None,
+    Option(
+        words="Output that a column holds; else columns are named as outputs. May be repeated.",
+        shown="OUTPUT=COLUMN",
+        example="outer.y=probe_2",
+    ),
+]
+Begin = Annotated[
+    float,
+    Option(words="Time of the run at which the data's time is zero.", example='"0.24 s"', shown="TIME", unit="s"),
+]
+Shift = Annotated[
+    str | None,
+    Option(
+        words="Bounds of an unknown shift of the data's time, one for each trial.",
+        shown="A:B",
+        example='"-1 ms:1 ms"',
+    ),
+]
+Gain = Annotated[bool, Option(words="Find a gain of each signal.", flags=("--gain/--no-gain",))]
+Offset = Annotated[bool, Option(words="Find an offset of each signal.", flags=("--offset/--no-offset",))]
+Loss = Annotated[
+    str,
+    Option(
+        words="`linear` for normal noise; `huber` or `cauchy` where some samples are wrong.",
+        shown="NAME",
+        choices=("linear", "huber", "cauchy"),
+    ),
+]
+FitStarts = Annotated[
+    int, Option(words="Starts: the scene's values, and others within the bounds.", shown="N", least=1, most=100)
+]
+Profile = Annotated[
+    bool,
+    Option(words="Intervals by profiles of the misfit, not by its curvature.", flags=("--profile/--no-profile",)),
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedNumber:
+    """A number that was found, SI.
+
+    Attributes
+    ----------
+    name, unit : what it is
+    kind : ``parameter``, or of the measurement ``shift``, ``gain``, ``offset``
+    value : NaN where the data do not determine it
+    deviation : standard deviation; NaN likewise, and where a bound holds it
+    low, high : 95 % interval; NaN likewise, and for a profile that ends at a bound
+    held : ``first`` or ``second`` where that end of its range holds it, else empty
+    shown_unit, factor : unit for people, and its size
+    """
+
+    name: str
+    unit: str
+    kind: str
+    value: float
+    deviation: float
+    low: float
+    high: float
+    held: str
+    shown_unit: str
+    factor: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UndeterminedGroup:
+    """Numbers that the data do not determine each.
+
+    Attributes
+    ----------
+    names : of the numbers
+    words : what is not determined
+    combination : what of them is, as ``a · b``; empty where there is no single one
+    value, deviation : of the combination, SI, and its standard deviation as a share of it; NaN where there is none
+    """
+
+    names: tuple[str, ...]
+    words: str
+    combination: str
+    value: float
+    deviation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FittedSignal:
+    """A measured signal and the model's.
+
+    Attributes
+    ----------
+    name, unit : of the signal
+    t : times as recorded, shape (samples,) [s]
+    measured, model : samples, of the same shape
+    noise : deviation of the differences, by the median for a robust loss
+    correlation : of differences with the next one [1]
+    """
+
+    name: str
+    unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    model: np.ndarray
+    noise: float
+    correlation: float
+
+    @property
+    def white(self) -> bool:
+        """Whether differences look independent of each other, as intervals assume."""
+        return abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Fit(ShortRepr, Reported):
+    """Parameters that fit measured signals best.
+
+    Attributes
+    ----------
+    numbers : parameters, then shifts, gains and offsets
+    correlations : of the numbers, NaN for those without a deviation, shape (numbers, numbers)
+    undetermined : groups of numbers that the data do not determine
+    signals : measured and fitted
+    starts : values of the parameters where each search began, and the misfit where it ended
+    loss, profile, rtol : as asked for
+    converged : whether the best search ended by itself
+
+    Examples
+    --------
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3, parameters={"bearing.clearance": 13e-6})
+    >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+    >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+    >>> found = model.fit(data, "bearing.clearance=5 um:30 um")
+    >>> abs(found.numbers[0].value - 13e-6) < 3.0 * found.numbers[0].deviation < 1e-8
+    True
+    """
+
+    numbers: tuple[FittedNumber, ...]
+    correlations: np.ndarray
+    undetermined: tuple[UndeterminedGroup, ...]
+    signals: tuple[FittedSignal, ...]
+    starts: tuple[tuple[tuple[float, ...], float], ...]
+    loss: str
+    profile: bool
+    rtol: float
+    converged: bool
+
+    def _report(self) -> Report:
+        samples = sum(len(one.t) for one in self.signals)
+        table = ReportTable(
+            title=f"Fit to {samples} samples of {', '.join(one.name for one in self.signals)}",
+            heads=("number", "value", "deviation", "95 % interval", "unit"),
+            rows=[_row(one) for one in self.numbers],
+            right=("value", "deviation"),
+            caption="intervals by profiles of the misfit" if self.profile else "",
+        )
+        said = []
+        for one in self.undetermined:
+            said.append(one.words)
+            if one.combination:
+                said.append(
+                    f"Determined is {one.combination} = {one.value:.6g} in SI, ± {100.0 * one.deviation:.2g} %."
+                )
+        said += [
+            f"Noise of {one.name}: {one.noise:.3g} {one.unit}, {100.0 * one.noise / float(np.std(one.measured)):.2g} % "
+            "of the signal"
+            for one in self.signals
+        ]
+        pairs = np.argwhere(np.triu(np.abs(np.nan_to_num(self.correlations)), 1) > CORRELATED)
+        said += [
+            f"{self.numbers[i].name} and {self.numbers[j].name}: correlation {self.correlations[i, j]:.3f}"
+            for i, j in pairs.tolist()
+        ]
+        if len(self.starts) > 1:
+            ends = ", ".join(f"{end:.6g}" for _, end in self.starts)
+            said.append(f"{len(self.starts)} starts ended at mean squares of differences over noise of {ends}")
+        warned = [
+            f"{one.name}: each difference is correlated with the next one ({one.correlation:.2f}). Intervals hold for "
+            "white noise: the model leaves something out, or the noise is filtered. They are too narrow then."
+            for one in self.signals
+            if not one.white
+        ]
+        facts = {
+            "numbers": [asdict(one) for one in self.numbers],
+            "correlations": self.correlations.tolist(),
+            "undetermined": [asdict(one) for one in self.undetermined],
+            "signals": [
+                {
+                    "name": one.name,
+                    "unit": one.unit,
+                    "samples": len(one.t),
+                    "noise": one.noise,
+                    "correlation": one.correlation,
+                }
+                for one in self.signals
+            ],
+            "starts": [{"start": list(start), "end": end} for start, end in self.starts],
+            "loss": self.loss,
+            "profile": self.profile,
+            "rtol": self.rtol,
+            "converged": self.converged,
+        }
+        fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."
+        records = [asdict(one) for one in self.numbers]
+        return Report(parts=(table, *said), facts=facts, records=records, index=("name",), warnings=warned, fault=fault)
+
+
+def _row(one: FittedNumber) -> tuple[str, ...]:
+    if math.isnan(one.value):
+        return one.name, "not determined", "", "", ""
+    if one.held:
+        return one.name, f"{one.value / one.factor:.6g}", "", f"held by its {one.held} end", one.shown_unit
+    digits = max(3, 3 + math.floor(math.log10(max(abs(one.value) / one.deviation, 1.0))))
+    low, value, high = (
+        "bound" if math.isnan(number) else f"{number / one.factor:.{digits}g}"
+        for number in (one.low, one.value, one.high)
+    )
+    return one.name, value, f"{one.deviation / one.factor:.3g}", f"{low} to {high}", one.shown_unit
+
+
+def _figures(_model: AnyModel, found: Fit, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.residuals import draw_residuals
+
+    for k, one in enumerate(found.signals, start=1):
+        words = (one.name, one.unit, one.noise)
+        yield ("residuals" if k == 1 else f"residuals_{k}"), draw_residuals(*words, one.t, one.measured, one.model)
+
+
+def _check(_values: Mapping[str, object]) -> None:
+    need("scipy")
+
+
+@Question(stage="fit", figures=_figures, check=_check)
+def fit(
+    model: AnyModel,
+    data: Data,
+    vary: Vary,
+    signal: Signals = None,
+    *,
+    begin: Begin = 0.0,
+    shift: Shift = None,
+    gain: Gain = False,
+    offset: Offset = False,
+    loss: Loss = "linear",
+    profile: Profile = False,
+    starts: FitStarts = 1,
+    parameters: Mapping[str, float] | None = None,
+    rtol: Rtol = None,
+    progress: Progress = None,
+) -> Fit:
+    """Find parameters from measured signals by least squares, with exact derivatives of the run.
+
+    What the data do not determine is named, not given as a number. In Python, data may also be mappings with `time` and
+    arrays by output, SI, one for each trial.
+
+    Parameters
+    ----------
+    parameters : overrides of other parameters, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        Unknown names, wrong bounds or files, or a law whose force jumps.
+    SimulationError
+        The run at a start failed, or the motion is chaotic, so that no run repeats the measured one.
+
+    Examples
+    --------
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+    >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+    >>> data = {"time": run.t, "inner.y": 2.0 * run["inner.y"] + noise}
+    >>> found = model.fit(data, "bearing.clearance=5 um:30 um", gain=True)
+    >>> [one.kind for one in found.numbers], f"{found.numbers[1].value:.2f}"
+    (['parameter', 'gain'], '2.00')
+    """
+    from scipy.stats.qmc import Halton
+
+    from ballpass.runtime.ask.fitting import fit_unknowns
+    from ballpass.runtime.ask.measured import read_columns, read_trial
+    from ballpass.runtime.ask.misfit import Misfit
+    from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.run.locating import refuse_jumps
+
+    refuse_jumps(model.manifest, "fit")
+    texts = [vary] if isinstance(vary, str) else list(vary)
+    ranges = [parameter_range(model.manifest, "vary", text) for text in texts]
+    sources = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
+    columns = read_columns(signal)
+    tolerance = DEFAULT_RTOL if rtol is None else rtol
+    misfit = Misfit(
+        model,
+        [read_trial(model.manifest, source, columns, k) for k, source in enumerate(sources, start=1)],
+        ranges,
+        begin=begin,
+        shift=_shift(shift),
+        gain=gain,
+        offset=offset,
+        parameters=dict(parameters or {}),
+        rtol=tolerance,
+    )
+    scene = model.numbers(parameters).parameters
+    first = np.clip([one.share_of(scene[one.name]) for one in ranges], INSIDE, 1.0 - INSIDE)
+    others = INSIDE + (1.0 - 2.0 * INSIDE) * Halton(len(ranges), scramble=False).random(starts)[1:]
+    found = []
+    with shown("fitting", progress) as tell:
+        for k, shares in enumerate([first, *others]):
+            begun = misfit.start(shares)
+            told = None if tell is None else lambda done, k=k: tell((k + done) / starts)  # type: ignore[misc]
+            found.append((begun, fit_unknowns(misfit, begun, loss, told)))
+        # all in the noise of the best, for their noises differ
+        best = min((one for _, one in found), key=lambda one: float(np.sum(np.log(one.noise))))
+        _refuse_chaos(model, misfit, best)
+        return _answer(misfit, best, found, loss=loss, profile=profile, rtol=tolerance)
+
+
+def _shift(text: str | None) -> ParameterRange | None:
+    """Bounds of a shift of time."""
+    from ballpass.runtime.ask.parameter_range import ParameterRange
+
+    if text is None:
+        return None
+    ends = text.split(":")
+    try:
+        low, high = (parse_quantity(end.strip(), "s") for end in ends)
+    except (QuantityError, ValueError):
+        low = high = 0.0
+    if not low < high:
+        raise RequestError(f'shift: {text!r:.80} is no range of times. Allowed: A:B, as in "-1 ms:1 ms".')
+    words = "Shift of the data's time"
+    return ParameterRange(name="shift", unit="s", words=words, low=low, high=high, shown_unit="ms", factor=1e-3)
+
+
+def _refuse_chaos(model: AnyModel, misfit: Misfit, fitted: Fitted) -> None:
+    from ballpass.runtime.certify.growth import refuse_growth
+    from ballpass.runtime.run.request import Request
+
+    if not (model.states and model.has_stepper):
+        return
+    for numbers, length in misfit.runs(fitted.counts):
+        names = list(dict.fromkeys(one.output for one in misfit.records))
+        refuse_growth(model, numbers, Request(duration=length, transient_cycles=0.0), names)
+
+
+def _answer(
+    misfit: Misfit,
+    best: Fitted,
+    found: Sequence[tuple[np.ndarray, Fitted]],
+    *,
+    loss: str,
+    profile: bool,
+    rtol: float,
+) -> Fit:
+    """The answer from the best search."""
+    from ballpass.runtime.ask.fitting import profile_end
+
+    values = misfit.values(best.counts)
+    groups = _groups(misfit, best)
+    unknown = {name for group in groups for name in group.names}
+    deviations = np.sqrt(np.diag(best.covariance))
+    numbers = []
+    for k, one in enumerate(misfit.unknowns):
+        ends = [best.counts[k] - best.spread * deviations[k], best.counts[k] + best.spread * deviations[k]]
+        blind = one.name in unknown
+        if profile and not blind and not best.held[k]:
+            ends = [profile_end(misfit, best, loss, k, side) for side in (-1.0, 1.0)]
+        slope = one.slope(float(best.counts[k]))
+        low, high = sorted(
+            float(one.value(end)) if profile else values[k] + slope * (end - best.counts[k]) for end in ends
+        )
+        none = blind or bool(best.held[k])
+        numbers.append(
+            FittedNumber(
+                name=one.name,
+                unit=one.unit,
+                kind=one.kind,
+                value=math.nan if blind else float(values[k]),
+                deviation=math.nan if none else float(abs(slope) * deviations[k]),
+                low=math.nan if none else float(low),
+                high=math.nan if none else float(high),
+                held=best.held[k],
+                shown_unit=one.range.shown_unit if one.range is not None else one.unit,
+                factor=one.range.factor if one.range is not None else 1.0,
+            )
+        )
+    sizes = np.where([math.isnan(one.deviation) for one in numbers], np.nan, np.where(deviations > 0, deviations, 1.0))
+    signals = [
+        FittedSignal(
+            name=record.name,
+            unit=record.unit,
+            t=record.t,
+            measured=record.values,
+            model=record.values + difference,
+            noise=float(noise),
+            correlation=_correlation(difference),
+        )
+        for record, difference, noise in zip(misfit.records, best.differences, best.noise, strict=True)
+    ]
+    parts = len(misfit.ranges)
+    return Fit(
+        numbers=tuple(numbers),
+        correlations=best.covariance / np.outer(sizes, sizes),
+        undetermined=groups,
+        signals=tuple(signals),
+        starts=tuple(
+            (
+                tuple(misfit.values(begun)[:parts].tolist()),
+                float(np.mean(np.concatenate([d / n for d, n in zip(one.differences, best.noise, strict=True)]) ** 2)),
+            )
+            for begun, one in found
+        ),
+        loss=loss,
+        profile=profile,
+        rtol=rtol,
+        converged=best.converged,
+    )
+
+
+def _correlation(differences: np.ndarray) -> float:
+    """Of each difference with the next one, about their mean."""
+    away = differences - np.mean(differences)
+    return float(np.sum(away[1:] * away[:-1]) / max(float(np.sum(away**2)), 1e-300))
+
+
+def _groups(misfit: Misfit, best: Fitted) -> tuple[UndeterminedGroup, ...]:
+    """Groups of unknowns that share a direction which the data do not determine."""
+    left, groups = list(best.blind), []
+    while left:
+        some, members = [left.pop(0)], set()
+        while True:
+            members = {k for one in some for k in one.unknowns}
+            more = [one for one in left if members & set(one.unknowns)]
+            if not more:
+                break
+            some += more
+            left = [one for one in left if one not in more]
+        places = sorted(members)
+        rows = np.zeros((len(some), len(places)))
+        for row, one in zip(rows, some, strict=True):
+            row[[places.index(k) for k in one.unknowns]] = one.changes
+        groups.append(_group(misfit, best, places, rows))
+    return tuple(groups)
+
+
+def _group(misfit: Misfit, best: Fitted, places: Sequence[int], rows: np.ndarray) -> UndeterminedGroup:
+    """A group of unknowns, with the directions that are not determined as rows."""
+    from scipy.linalg import null_space
+
+    unknowns = [misfit.unknowns[k] for k in places]
+    names = tuple(one.name for one in unknowns)
+    across = null_space(rows)
+    every = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
+    if not across.shape[1]:
+        words = f"The data do not determine {every}: other values within the bounds fit as well."
+        return UndeterminedGroup(names=names, words=words, combination="", value=math.nan, deviation=math.nan)
+    ways = []
+    for row in rows:
+        moves = [
+            f"{one.name} {'grows' if change > 0 else 'falls'} by {abs(change):.3g} %"
+            + ("" if one.relative else " of its range")
+            for one, change in zip(unknowns, row.tolist(), strict=True)
+            if change
+        ]
+        ways.append(f"where {' and '.join(moves)}, nothing changes beyond the noise")
+    words = f"The data do not determine {every} each: {'; '.join(ways)}."
+    if across.shape[1] > 1 or not all(one.relative for one in unknowns):
+        return UndeterminedGroup(names=names, words=words, combination="", value=math.nan, deviation=math.nan)
+    exponents = across[:, 0] / across[np.argmax(np.abs(across[:, 0])), 0]
+    values = misfit.values(best.counts)
+    gradient = np.zeros(len(values))
+    for k, exponent in zip(places, exponents.tolist(), strict=True):
+        gradient[k] = exponent * misfit.unknowns[k].slope(float(best.counts[k])) / values[k]
+    plain = [float(round(e)) if abs(e - round(e)) < 0.02 else float(f"{e:.3g}") for e in exponents.tolist()]
+    return UndeterminedGroup(
+        names=names,
+        words=words,
+        combination=" · ".join(n if e == 1.0 else f"{n}^{e:g}" for n, e in zip(names, plain, strict=True)),
+        value=float(np.prod([abs(values[k]) ** e for k, e in zip(places, plain, strict=True)])),
+        deviation=float(np.sqrt(gradient @ best.covariance @ gradient)),
+    )
