@@ -12,7 +12,8 @@ import numpy as np
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
-from ballpass.runtime.contract import Manifest, read_artefact
+from ballpass.runtime.certify.transient import find_transient
+from ballpass.runtime.contract import Manifest, RunInfo, read_artefact
 from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.parameters import Numbers
@@ -123,6 +124,7 @@ class Model(PointModel, Questions):
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
         self._assembled = b""  # parameters whose linkage was looked at last
+        self._run_settings: RunInfo | None = None
         if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
 
@@ -130,6 +132,13 @@ class Model(PointModel, Questions):
 
     def __reduce__(self) -> tuple[Callable[[str, str, str | None], Model], tuple[str, str, str | None]]:
         return _load_same, (str(self.folder), self.manifest.signature, self._compiler)
+
+    @property
+    def run_settings(self) -> RunInfo:
+        """How long to run: as the scene says, else turns of the steady machine at the scene's own numbers."""
+        if self._run_settings is None:
+            self._run_settings = self.manifest.run if self.manifest.run.stated else find_transient(self)
+        return self._run_settings
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -231,7 +231,7 @@ def _read(root: Table, name: str) -> Scene:
             loads=loads,
             bearings=bearings,
             outputs=outputs,
-            run=replace(run, at_rest=seated),
+            run=replace(run, at_rest=seated, stated="run" in root.data),
         )
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 

@@ -374,6 +374,7 @@ class RunSettings:
     """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s].
 
     Where the file gives neither a transient nor the rings' initial state, they start `at_rest` under the load of t = 0.
+    It is not `stated` where the file has no run: its turns are then those of the steady machine.
     """
 
     either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
@@ -418,6 +419,7 @@ class RunSettings:
         note="see {doc}`../theory/integration`",
     )
     at_rest: bool = False
+    stated: bool = True
 
 
 #: Outputs of a run, which `Scene.outputs` holds.

@@ -7,7 +7,7 @@ to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 t
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -172,9 +172,11 @@ def run(
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
-        from ballpass.runtime.app.summary import add_turns, start_words, summarize
+        from ballpass.runtime.app.summary import add_turns, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.app.summary_words import stands_out
+        from ballpass.runtime.app.transient_words import transient_words
+        from ballpass.runtime.ask.peaks import run_of
         from ballpass.runtime.report.report import Report
         from ballpass.runtime.report.text import show as show_report
         from ballpass.runtime.run.settle import look_further
@@ -244,8 +246,12 @@ def run(
                 warn(longer.words)
         else:
             longer = look_further(model, model.numbers(asked.overrides), solution)
-            if longer is not None and longer.first:
-                warn(start_words(longer, solution))
+            if longer is not None:
+                own = run_of(model, model.numbers(asked.overrides), solution)
+                own = replace(own, start=longer.reductions.start, transient_cycles=solution.transient_cycles)
+                length = (cycles, duration, transient)
+                for words in transient_words(model, own, longer, asked=length != (None, None, None)):
+                    warn(words)
         taken = solution.statistics
         asked_for = (
             model.quantities(

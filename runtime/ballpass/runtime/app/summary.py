@@ -30,7 +30,7 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
-from ballpass.runtime.quantity.grammar import channels_of, quantities_of
+from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.run.driver_angle import TURN
@@ -213,22 +213,6 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     lines.sort(key=lambda line: -line[0])
     more = f", and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
     return f"{over}: {', '.join(text for _, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
-
-
-def start_words(longer: Settled, sol: Solution) -> str:
-    """A warning about extremes of the first turns, which later ones do not come near."""
-    # forces first: they are what is designed by
-    names = sorted(longer.first, key=lambda name: "ball." not in name)
-    kind, time, value, later = longer.first[names[0]]
-    _, unit = channels_of(sol.manifest)[names[0]]
-    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
-    turn = "" if sol.cycle_length is None else f", in turn {int(time / sol.cycle_length) + 1}"
-    more = f", and {len(names) - 1} more" if len(names) > 1 else ""
-    return (
-        f"extremes of the start, not of the steady machine: {names[0]} has its {kind} of {factor * value:.4g} {shown} "
-        f"at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
-        "(--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
-    )
 
 
 def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:

@@ -47,6 +47,12 @@ PARTED = 1e-3
 #: Looser runs are looked at by this tolerance: what their steps lose is their error, not a growth [1].
 LOOSEST = 1e-6
 
+#: Tolerance of a second look at what a large change of the start leaves, over that of the first [1].
+TIGHTER = 1e-2
+
+#: Steps of that and of the first one, over those of a run [1].
+TIGHTER_COSTS = 6
+
 #: Change of a start that derivatives are to be good for [1].
 TINY = 1e-10
 
@@ -70,6 +76,7 @@ class Growth(ShortRepr):
     changes : largest change of minimum, maximum and rms of each channel, relative to the largest of them [1]
     uncertain : channels whose digits the tolerance does not bear
     parted : how far the states are apart at the end of the run, in their magnitudes [1]
+    steps : of the run
     spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
     """
 
@@ -77,6 +84,7 @@ class Growth(ShortRepr):
     changes: Mapping[str, float]
     uncertain: tuple[str, ...]
     parted: float = 0.0
+    steps: int = 0
     spread: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -119,14 +127,37 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
         The computation failed.
     """
     run = stepper_run(model, numbers, request)
-    rtol = min(run.rtol, LOOSEST)
-    kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
-    way = MethodChoice(method="stepper", rtol=rtol, kinks=kinks)
-    found = _compare(run, way)
-    if (found.uncertain or found.parted > PARTED) and kinks != LOCATED:
+    way = _way(run, request.kinks)
+    moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
+    found = _compare(run, way, moved)
+    if (found.uncertain or found.parted > PARTED) and way.kinks != LOCATED:
         way = replace(way, kinks=LOCATED)
-        found = _compare(run, way)
+        found = _compare(run, way, moved)
     return _spread(run, way, found) if (found.uncertain or found.parted > PARTED) and spread else found
+
+
+def by_moved_start(run: Run, moved: np.ndarray, most: int) -> Growth:
+    """Compare a run with one whose positions at the start are moved, shape (states / 2,) [m].
+
+    Parameters
+    ----------
+    most : steps; runs of more are not repeated by a tighter tolerance
+
+    Raises
+    ------
+    SimulationError
+        The computation failed.
+    """
+    way = _way(run, None)
+    found = _compare(run, way, moved)
+    # what steps lose over kinks shrinks with the tolerance as well, and needs no other library
+    again = found.uncertain and TIGHTER_COSTS * found.steps <= most
+    return _compare(run, replace(way, rtol=TIGHTER * way.rtol), moved) if again else found
+
+
+def _way(run: Run, kinks: str | None) -> MethodChoice:
+    rtol = min(run.rtol, LOOSEST)
+    return MethodChoice(method="stepper", rtol=rtol, kinks=choose_kinks(kinks, "stepper", run.model.manifest, rtol))
 
 
 def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
@@ -148,20 +179,19 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
         )
 
 
-def _compare(run: Run, way: MethodChoice) -> Growth:
+def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> Growth:
     channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
     names = [f"{kind}:{name}" for name in channels for kind in KINDS]
     quantities = QuantityRun(run.model, quantities_of(run.model, names))
-    moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
 
-    def integrate(start: float | np.ndarray, before: float) -> tuple[np.ndarray, np.ndarray]:
+    def integrate(start: float | np.ndarray, before: float) -> tuple[np.ndarray, np.ndarray, int]:
         tell = run.progress
         told = replace(run, progress=None if tell is None else lambda done: tell(before + 0.5 * done))
         found = way.measure(quantities, told, start)
         assert found.end is not None  # channels are of the motion
-        return found.values.reshape(-1, len(KINDS)), found.end
+        return found.values.reshape(-1, len(KINDS)), found.end, found.steps
 
-    (one, end), (other, other_end) = integrate(0.0, 0.0), integrate(moved, 0.5)
+    (one, end, steps), (other, other_end, _) = integrate(0.0, 0.0), integrate(moved, 0.5)
     tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
     changes, uncertain = {}, []
     for name, mine, its in zip(channels, one, other, strict=True):
@@ -170,7 +200,7 @@ def _compare(run: Run, way: MethodChoice) -> Growth:
         if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
             uncertain.append(name)
     parted = float(np.max(np.abs(other_end - end) / run.magnitude))
-    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted)
+    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted, steps=steps)
 
 
 def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:

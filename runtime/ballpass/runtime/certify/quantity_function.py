@@ -128,7 +128,7 @@ class QuantityFunction:
                 raise RequestError(unknown_name("parameter", name, numbers.parameters))
         self.start = np.array([numbers.parameters[name] for name in self.wrt])
         self._quantities = quantities_of(model, self.of)
-        self._request = length_request(model.manifest, cycles, duration, transient)
+        self._request = length_request(model, cycles, duration, transient)
         # not for two threads at once: each thread takes a free one and puts it back
         self._free: defaultdict[tuple[int, ...], list[QuantityRun]] = defaultdict(list)
         self._slope_rtol = max(FUNCTION_SLOPES * self._rtol, TOLERANCES[0])

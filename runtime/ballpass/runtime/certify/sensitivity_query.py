@@ -35,7 +35,6 @@ from ballpass.runtime.certify.sensitivity_report import (
     SensitivityReport,
     ratio_unit,
 )
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
@@ -94,7 +93,7 @@ class Query:
 
 
 def length_request(
-    manifest: Manifest, cycles: float | None, duration: float | None, transient: float | None
+    model: LoadedModel, cycles: float | None, duration: float | None, transient: float | None
 ) -> Request:
     """How long to run: as given, else as the scene's run settings say.
 
@@ -103,13 +102,13 @@ def length_request(
     RequestError
         Both cycles and duration, or numbers that are none.
     """
-    turns, time = asked_length(manifest.run, cycles, duration)
-    dropped = manifest.run.transient_cycles if transient is None else transient
+    turns, time = asked_length(model, cycles, duration)
+    dropped = model.run_settings.transient_cycles if transient is None else transient
     return Request(cycles=turns, duration=time, transient_cycles=check_transient(dropped))
 
 
 def make_query(
-    manifest: Manifest,
+    model: LoadedModel,
     *,
     of: str | Sequence[str] | None,
     wrt: str | Sequence[str] | None,
@@ -143,7 +142,7 @@ def make_query(
     return Query(
         of=[of] if isinstance(of, str) else of,
         wrt=[wrt] if isinstance(wrt, str) else wrt,
-        request=length_request(manifest, cycles, duration, transient),
+        request=length_request(model, cycles, duration, transient),
         method=method,
         check=check,
         rtol=DERIVATIVE_RTOL if rtol is None else rtol,

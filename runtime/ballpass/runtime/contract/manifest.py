@@ -166,6 +166,7 @@ class RunInfo:
     """Run settings of the scene file; exactly one of `cycles` and `duration` [s] is given.
 
     `at_rest`: rings start at rest under the load of t = 0, for the scene says neither where nor what is transient.
+    `stated`: whether the scene has a run; otherwise its turns are those of the steady machine.
     """
 
     cycles: float | None
@@ -175,6 +176,7 @@ class RunInfo:
     method: str
     rtol: float
     at_rest: bool = False
+    stated: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

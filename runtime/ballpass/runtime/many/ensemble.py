@@ -248,7 +248,7 @@ def simulate_many(
     if driver is not None and at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns, bounded=bounded)
-    skipped = manifest.run.transient_cycles if transient is None else real(transient)
+    skipped = model.run_settings.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = driver is not None and lanes and at_kinks != LOCATED
     by_steps = [item for item in chosen if is_reduced(model, item)]
@@ -340,11 +340,10 @@ def _threads(given: int | None) -> int:
 
 def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
     """Lengths of the members' runs; members for which there is none are refused."""
-    run = model.manifest.run
     if cycles is not None and duration is not None:
         raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
     if cycles is None and duration is None:
-        cycles, duration = run.cycles, run.duration
+        cycles, duration = model.run_settings.cycles, model.run_settings.duration
     for name, value in (("cycles", cycles), ("duration", duration)):
         if value is not None and not 0.0 < real(value) < np.inf:
             raise RequestError(f"{name}: a number above 0 is expected, not {value!r:.80}.")

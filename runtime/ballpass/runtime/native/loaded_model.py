@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract import Manifest, RunInfo
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
@@ -77,6 +77,11 @@ class LoadedModel(CompiledFunctions):
     def compiled(self) -> bool:
         """Whether generated C runs."""
         return self.library is not None
+
+    @property
+    def run_settings(self) -> RunInfo:
+        """How long to run; `Model` finds the transient that a scene does not state."""
+        return self.manifest.run
 
     @property
     def parameters(self) -> Parameters:

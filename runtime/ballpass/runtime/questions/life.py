@@ -44,7 +44,7 @@ def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, f
             yield f"pressure{ending}", _pressure(model, info, bearing, numbers, title)
 
 
-@Question(figures=life_figures)
+@Question(figures=life_figures, steady=True)
 def life(
     model: PointModel,
     cycles: Cycles = None,
@@ -106,7 +106,7 @@ def _pressure(
     from ballpass.runtime.run.resolve import resolve
 
     numbers = model.numbers(overrides)
-    run = resolve(model, numbers, Request(cycles=model.manifest.run.transient_cycles + 1.0))
+    run = resolve(model, numbers, Request(cycles=model.run_settings.transient_cycles + 1.0))
     samples = load_samples(run)[info.prefix]
     inner, outer = contacts_of(info, numbers.values)
     ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
@@ -132,7 +132,7 @@ def _clearance(
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
-    transient = model.manifest.run.transient_cycles
+    transient = model.run_settings.transient_cycles
     asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
     found = model.simulate_many(table, list(asked.values()), cycles=transient + TURNS)
     if found.interrupted:

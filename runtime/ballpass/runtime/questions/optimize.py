@@ -248,7 +248,11 @@ def _check(_values: Mapping[str, object]) -> None:
     need("scipy")
 
 
-@Question(stage="search", figures=_figures, check=_check)
+def _best(found: Optimum) -> dict[str, float]:
+    return dict(zip((one.name for one in found.vary), found.x.tolist(), strict=True))
+
+
+@Question(stage="search", figures=_figures, check=_check, steady=_best)
 def optimize(
     model: AnyModel,
     minimize: Goal,

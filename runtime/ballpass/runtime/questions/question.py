@@ -40,6 +40,8 @@ class Question:
     samples : whether samples are enough, which other methods give without a compiler
     takes_runs : whether the solution of a run may stand in place of the model
     figures : of a model, an answer and overrides, by names of files
+    steady : whether its numbers are those of the steady machine, so that what is not is warned of; where it finds
+        parameters itself, a function of the answer that gives them
     always : whether figures are drawn into the folder of the results unless they are turned off; otherwise figures and
         ``<name>.json`` are written where a folder is given
     """
@@ -53,6 +55,7 @@ class Question:
     takes_runs: bool = False
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
     always: bool = False
+    steady: bool | Callable[[Any], Mapping[str, float]] = False
 
     def __call__(self, ask: _Function) -> _Function:
         @wraps(ask)

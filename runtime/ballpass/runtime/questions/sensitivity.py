@@ -49,7 +49,7 @@ def _figures(_model: Any, report: SensitivityReport, _parameters: Any) -> Iterat
     return tornados(report)
 
 
-@Question(stage="differentiate", figures=_figures)
+@Question(stage="differentiate", figures=_figures, steady=True)
 def sensitivity(
     model: PointModel,
     of: Of = None,
@@ -99,7 +99,7 @@ def sensitivity(
     from ballpass.runtime.point.run_start import run_numbers
 
     query = make_query(
-        model.manifest,
+        model,
         of=of,
         wrt=wrt,
         cycles=cycles,

@@ -421,7 +421,7 @@ def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: f
     turn = period(manifest, values)
     if not math.isfinite(turn) or any(item.name == DRIVER_ACCELERATION for item in manifest.inputs):
         return None
-    settings = manifest.run
+    settings = model.run_settings
     stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
     dropped = settings.transient_cycles if transient is None else transient
     return max(stated, dropped + turns_to_tell(manifest, values))

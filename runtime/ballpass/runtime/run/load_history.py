@@ -73,8 +73,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     """
     manifest = model.manifest
     turn = driver_angle.period(manifest, numbers.values)
-    run = manifest.run
-    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    transient = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
     given = request.cycles is not None or request.duration is not None
     doubles = not given and not timed and math.isfinite(turn)

@@ -20,7 +20,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.start import Start
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest, RunInfo
+    from ballpass.runtime.contract import Manifest
 
 #: Longest run, in turns and in time [s].  A press takes days of computing for so many turns, and
 #: the angle of an edge within the last of them is exact to a thousandth of a turn.
@@ -119,8 +119,8 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
     return on_request(name) or f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 
 
-def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
-    """Turns or time [s] to run, one of them None: as given, else from the scene's run settings.
+def asked_length(model: LoadedModel, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
+    """Turns or time [s] to run, one of them None: as given, else from the model's run settings.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> 
     if cycles is not None and duration is not None:
         raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
     if cycles is None and duration is None:
-        cycles, duration = run.cycles, run.duration
+        cycles, duration = model.run_settings.cycles, model.run_settings.duration
     if cycles is not None:
         if not 0.0 < real(cycles) < math.inf:
             raise RequestError(f"cycles: a number above 0 is expected, not {cycles!r:.80}.")
@@ -142,7 +142,7 @@ def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> 
 
 def run_length(model: LoadedModel, request: Request, turn: float) -> float:
     """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns where nothing turns."""
-    cycles, duration = asked_length(model.manifest.run, request.cycles, request.duration)
+    cycles, duration = asked_length(model, request.cycles, request.duration)
     if duration is not None:
         return duration
     assert cycles is not None

@@ -144,7 +144,7 @@ def resolve(
     """
     settings = model.manifest.run
     turn = driver_angle.period(model.manifest, numbers.values)
-    given = settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    given = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     transient = check_transient(given)
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)
     begin, initial = start_time(request.initial), start_state(model, numbers, request.initial)
@@ -172,7 +172,7 @@ def resolve(
         begin=begin,
         end=begin + duration,
         turn=turn,
-        turns=asked_length(settings, request.cycles, request.duration)[0] if request.times is None else None,
+        turns=asked_length(model, request.cycles, request.duration)[0] if request.times is None else None,
         transient_cycles=transient,
         start=max(begin, transient * turn if transient > 0.0 else 0.0),
         initial=initial,

@@ -7,10 +7,13 @@ of them may share a peak by luck.
 
 What later turns do not come near is of the start, as the impact of a ring that falls through its clearance: where the
 second half of the turns misses an extreme of the first by more than `START` of the range, the first half is transient.
+
+`look_beyond` shows what more turns change in any run.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -24,7 +27,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
 from ballpass.runtime.show import html
@@ -100,8 +103,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     if not (real(most) >= 2 * LEAST and int(most) == most):
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
-    settings = model.manifest.run
-    transient = settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    transient = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     turns = LEAST
     turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)
@@ -127,10 +129,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
 
 
 def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
-    """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
-
-    None where the run is about as long, nothing turns, a table gives the speed over time, or another method than the
-    project's own stepper ran.
+    """`look_beyond` of a run that is done; None where another method than the project's own stepper ran.
 
     Raises
     ------
@@ -138,16 +137,10 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
         The longer run failed.
     """
     few, statistics = solution.steady_reductions, solution.statistics
-    if any(item.name == DRIVER_ACCELERATION for item in model.manifest.inputs):
-        return None
     if few is None or solution.cycle_length is None or not statistics.steps:
         return None
-    whole = (few.start + few.duration - statistics.begin) / solution.cycle_length
-    turns = min(LEAST, int(STEPS * whole / statistics.steps))
-    if turns < 2.0 * few.duration / solution.cycle_length:
-        return None
     request = Request(
-        cycles=_dropped(solution.transient_cycles, statistics.begin, solution.cycle_length) + turns,
+        duration=statistics.duration,
         transient_cycles=solution.transient_cycles,
         method=statistics.method,
         rtol=statistics.rtol,
@@ -159,9 +152,45 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
             parameters=solution.parameters,
         ),
     )
-    run, counter = resolve(model, numbers, request), _counter(model)
-    going = start_reducing(run, channel_names(model.manifest))
-    going.go_on((run.start + run.end) / 2.0)
+    return look_beyond(resolve(model, numbers, request), few)
+
+
+def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
+    """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
+
+    None where the run is about as long, nothing turns, or a table gives the speed over time.
+
+    Parameters
+    ----------
+    few : reductions of the run, where they are known
+
+    Raises
+    ------
+    SimulationError
+        The longer run failed.
+    """
+    model, turn = run.model, run.turn
+    if not repeats(model, turn):
+        return None
+    if few is None:
+        going = start_reducing(run, channel_names(model.manifest))
+        going.go_on()
+        few = going.take()
+    whole = (few.start + few.duration - run.begin) / turn
+    turns = min(LEAST, int(STEPS * whole / max(few.steps, 1)))
+    if turns < 2.0 * few.duration / turn:
+        return None
+    request = Request(
+        cycles=_dropped(run.transient_cycles, run.begin, turn) + turns,
+        transient_cycles=run.transient_cycles,
+        method=run.method,
+        rtol=run.rtol,
+        kinks=run.kinks,
+        initial=RunEnd(time=run.begin, x=run.initial, states=model.states, parameters=run.numbers.parameters),
+    )
+    longer, counter = resolve(model, run.numbers, request), _counter(model)
+    going = start_reducing(longer, channel_names(model.manifest))
+    going.go_on((longer.start + longer.end) / 2.0)
     early = going.take()
     going.go_on()
     later = going.take()
@@ -170,6 +199,11 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
     changes = changed(few, found, counter)
     first = extremes_of_start(few, later, counter)
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
+
+
+def repeats(model: LoadedModel, turn: float) -> bool:
+    """Whether something turns, and no table gives the speed over time."""
+    return math.isfinite(turn) and all(item.name != DRIVER_ACCELERATION for item in model.manifest.inputs)
 
 
 def _dropped(transient: float, begin: float, turn: float) -> float:

@@ -185,7 +185,7 @@ def _ask(
                 stages("draw")
                 drawn = question.figures(model, answer, overrides)
                 written += write_figures(drawn, folder, formats, f"{question.name}.md")
-        for words in report.warnings:
+        for words in (*report.warnings, *_transient(question, model, values, overrides, answer)):
             warn(words)
     if json_:
         plain = to_plain(report)
@@ -197,6 +197,19 @@ def _ask(
     if report.fault:
         complain(report.fault)
         raise typer.Exit(1)
+
+
+def _transient(
+    question: Question, model: Any, values: Mapping[str, Any], overrides: Mapping[str, float], answer: Any
+) -> list[str]:
+    """Warnings that the numbers of an answer are not those of the steady machine."""
+    if not question.steady:
+        return []
+    from ballpass.runtime.app.transient_words import warnings_of_transient
+
+    found = {} if question.steady is True else question.steady(answer)
+    length = {name: values.get(name) for name in ("cycles", "duration", "transient")}
+    return warnings_of_transient(model, {**overrides, **found}, **length)
 
 
 def _place(

@@ -110,6 +110,7 @@ def sweep(
 
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
     from ballpass.runtime.app.commands.sweep_results import TABLE, Sweep
+    from ballpass.runtime.app.transient_words import warnings_of_transient
     from ballpass.runtime.certify.method_choice import default_compared
     from ballpass.runtime.many.cluster import connected
     from ballpass.runtime.quantity.grammar import default_quantities
@@ -156,6 +157,13 @@ def sweep(
             raise RequestError(f"--vary: none of the {count} members can be simulated. The first: {refused[0].message}")
         stages("write")
         swept = Sweep(result=result, ranges=ranges, fixed=overrides)
+        for member in dict.fromkeys((0, count - 1)):
+            at = {name: float(values[member]) for name, values in varied.items()}
+            if member not in {failure.member for failure in result.failures}:
+                for words in warnings_of_transient(
+                    model, {**overrides, **at}, cycles=cycles, duration=duration, transient=transient
+                ):
+                    warn(f"{swept.place(member)}: {words}")
         files = swept.write(folder, formats if figures else ())
     if figures and len(ranges) > 2:
         note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")

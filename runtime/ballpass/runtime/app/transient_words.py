@@ -1,0 +1,85 @@
+"""Warnings that numbers of a run are not those of the steady machine.
+
+In: a model, and the numbers and the length of a run.  Out: sentences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ballpass.runtime.app.summary import TABLE_UNITS
+from ballpass.runtime.certify.transient import still_changes
+from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.quantity.grammar import channels_of
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.settle import look_beyond
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.settle import Settled
+
+
+def warnings_of_transient(
+    model: Model,
+    parameters: Mapping[str, float],
+    *,
+    cycles: float | None = None,
+    duration: float | None = None,
+    transient: float | None = None,
+) -> list[str]:
+    """Sentences about a run of a command; none where it is steady, or nothing turns."""
+    if not (model.has_stepper and model.states):
+        return []
+    request = Request(cycles=cycles, duration=duration, transient_cycles=transient)
+    try:
+        run = resolve(model, model.numbers(parameters), request).check_steady()
+        return transient_words(model, run, look_beyond(run), asked=(cycles, duration, transient) != (None, None, None))
+    except SimulationError as fault:
+        return [f"whether these are numbers of the steady machine is not known, for a longer run failed: {fault}"]
+
+
+def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bool) -> list[str]:
+    """Sentences about a run and what more turns change.
+
+    Parameters
+    ----------
+    asked : whether its length or transient was asked for
+
+    Raises
+    ------
+    SimulationError
+        A run from another start failed.
+    """
+    if longer is not None and longer.first:
+        return [_start_words(model, longer)]
+    if asked or longer is None or model.manifest.run.stated:
+        return []
+    found = still_changes(run)
+    if not found.uncertain:
+        return []
+    name = max(found.uncertain, key=lambda channel: found.changes[channel])
+    return [
+        f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
+        f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
+        f"{', '.join(found.uncertain)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
+        "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
+    ]
+
+
+def _start_words(model: Model, longer: Settled) -> str:
+    """A warning about extremes of the first turns, which later ones do not come near."""
+    # forces first: they are what is designed by
+    names = sorted(longer.first, key=lambda name: "ball." not in name)
+    kind, time, value, later = longer.first[names[0]]
+    _, unit = channels_of(model.manifest)[names[0]]
+    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+    length = longer.reductions.cycle_length
+    turn = "" if length is None else f", in turn {int(time / length) + 1}"
+    more = f", and {len(names) - 1} more" if len(names) > 1 else ""
+    return (
+        f"extremes of the start, not of the steady machine: {names[0]} has its {kind} of {factor * value:.4g} {shown} "
+        f"at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
+        "(--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
+    )

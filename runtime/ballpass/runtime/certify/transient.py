@@ -1,0 +1,70 @@
+"""The transient of a scene that states no run: turns until the motion has forgotten its start.
+
+In: a model, or a `Run`.  Out: run settings, or what a moved start still changes.
+
+The balls meet the load elsewhere in each turn, so that other turns have other peaks, steady or not.  The same turns
+from two starts have the balls at the same places: what differs is of the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ballpass.runtime.certify.growth import Growth, by_moved_start
+from ballpass.runtime.contract import RunInfo
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.settle import repeats
+
+#: How far the rings are moved at the start, in their magnitudes [1]: what a start at rest is off by.
+MOVED = 0.1
+
+#: Steps that the search may take: about a second.
+SEARCH = 400_000
+
+
+def find_transient(model: LoadedModel) -> RunInfo:
+    """Run settings of a scene that states none: its turns, behind as many as the motion takes to forget its start.
+
+    The transient is doubled until that is so at the scene's own numbers; runs of other numbers are as long, so that
+    neighbours are alike.  Where `SEARCH` steps do not suffice it is as it was; `still_changes` has what that leaves.
+    """
+    given = model.manifest.run
+    numbers = model.numbers()
+    if given.cycles is None or not (model.has_stepper and model.states):
+        return given
+    if not repeats(model, driver_angle.period(model.manifest, numbers.values)):
+        return given
+    transient, length, left = given.transient_cycles, given.cycles - given.transient_cycles, SEARCH
+    try:
+        while left > 0:
+            run = resolve(model, numbers, Request(cycles=transient + length, transient_cycles=transient))
+            found = still_changes(run)
+            if not found.uncertain:
+                return replace(given, cycles=transient + length, transient_cycles=transient)
+            transient *= 2.0
+            left -= 2 * found.steps
+    except (RequestError, SimulationError):
+        pass  # the run that is asked for says what is wrong
+    return given
+
+
+def still_changes(run: Run) -> Growth:
+    """What rings that start elsewhere change in the turns that count.
+
+    Raises
+    ------
+    SimulationError
+        The computation failed.
+    """
+    moved = MOVED * run.magnitude[: len(run.magnitude) // 2]
+    mechanism = run.model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        # a driver that starts elsewhere stays elsewhere
+        moved[np.array(run.model.states[: len(moved)]) == mechanism.angle] = 0.0
+    return replace(by_moved_start(run, moved, SEARCH), moved=MOVED)
