@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ballpass.runtime.app.summary_words import inside, row_place, row_words
 from ballpass.runtime.ask.observables import statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, has_quantities, refine_peaks, run_of
 from ballpass.runtime.contract import Manifest
@@ -155,7 +156,7 @@ def _unusual(sol: Solution) -> list[str]:
     return said
 
 
-def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str:
+def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, instead: bool) -> str:
     """Add the results of more turns to a summary (``longer``).
 
     Parameters
@@ -168,7 +169,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     A sentence: which results change, over how many turns.
     """
     told: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
-    lines: list[tuple[float, str]] = []
+    lines: list[tuple[bool, float, str]] = []
     for name, found in longer.reductions.items():
         entry, numbers = _printed(name, found)
         if entry not in summary:
@@ -187,7 +188,10 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
             if change == math.inf or (counts and change > PEAKS):
                 now, first = (f"{factor * number:z.4g}" for number in (value, before))
                 than = f"instead of {first}" if now != first else "as before"
-                lines.append((change, f"{entry}.{kind} {now} {shown} {than}"))
+                row = f"{entry}.{kind}" if kind in _BALL_FORCES else entry
+                words = inside(row_words(manifest, row)) + ("" if kind in _BALL_FORCES else f", {kind}")
+                # rows of the table before those that it leaves out
+                lines.append((row_place(manifest, row) is None, -change, f"{words} {now} {shown} {than}"))
         if instead:
             summary[entry] |= told[entry]
             for key in numbers.keys() & _BALL_FORCES.keys():
@@ -203,14 +207,15 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     summary["longer"] = told
     if instead:
         summary["steady_cycles"] = told["turns"]
-        return f"{longer.words}. Samples and figures are those of the first turns."
-    over = f"over {longer.turns} steady turns"
+        words = longer.told(lambda name: inside(row_words(manifest, name)))
+        return f"{words}. Samples and figures are those of the first turns."
+    over = f"Over {longer.turns} steady turns"
+    lines.sort(key=lambda line: line[:2])
     if longer.settled:
         rest = f"peaks change by at most {100.0 * PEAKS:g} % of their range, rms by at most {100.0 * MEANS:g} %."
-        return f"{over}: {', '.join([*(text for change, text in lines if change == math.inf), rest])}"
-    lines.sort(key=lambda line: -line[0])
-    more = f", and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
-    return f"{over}: {', '.join(text for _, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
+        return f"{over}: {'; '.join([*(text for _, change, text in lines if change == -math.inf), rest])}"
+    more = f"; and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
+    return f"{over}: {'; '.join(text for *_, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
 
 
 def start_words(longer: Settled, sol: Solution) -> str:
@@ -222,10 +227,12 @@ def start_words(longer: Settled, sol: Solution) -> str:
     factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
     turn = "" if sol.cycle_length is None else f", in turn {int(time / sol.cycle_length) + 1}"
     more = f", and {len(names) - 1} more" if len(names) > 1 else ""
+    words = inside(row_words(sol.manifest, names[0]))
     return (
-        f"extremes of the start, not of the steady machine: {names[0]} has its {kind} of {factor * value:.4g} {shown} "
-        f"at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
-        "(--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
+        f"extremes of the start, not of the steady machine: {words} ({names[0]}) has its {kind} of "
+        f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. "
+        "Drop more turns (--transient), start at rest (--initial equilibrium), or let the run find its transient "
+        "(--turns settle)."
     )
 
 

@@ -72,6 +72,11 @@ def row_words(manifest: Manifest, name: str) -> str:
     return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
 
 
+def inside(words: str) -> str:
+    """Words of a row within a sentence."""
+    return words[:1].lower() + words[1:]
+
+
 def row_place(manifest: Manifest, name: str) -> int | None:
     """Place of a number among those a reader wants first; None for the others."""
     own = _of_bearing(manifest, name)[1]
