@@ -18,7 +18,7 @@ def press(make_model: Callable[..., Model]) -> Model:
 
 
 def test_derivatives_by_parameters_with_long_names_fit_80_columns(press: Model) -> None:
-    report = press.sensitivity(["peak_ball_force"], [LONGEST, "bearing.damping.ratio", "bearing.clearance"], 2)
+    report = press.sensitivity(["peak_ball_force"], [LONGEST, "bearing.damping.ratio", "bearing.clearance"], 4)
     lines = to_text(report._report()).splitlines()
     assert max(map(len, lines)) <= 80
     assert any(line.split()[:3] == ["parameter", "%", "per"] for line in lines)

@@ -106,6 +106,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     summary |= _forces(model, steady, peaks)
     summary |= _conditioning(model, steady)
     summary |= _balls(manifest, peaks)
+    summary |= _paths(steady)
     summary |= _motions(steady)
     summary |= _constants(steady)
     if growth is not None:
@@ -344,6 +345,17 @@ def _motions(sol: Solution) -> dict[str, Any]:
         found[info.name] = _numbers(info.name, info.unit, **_moments(values))
         where = "samples" if reduced is None else "every step"
         found[info.name]["searched"] = {"min": where, "max": where}
+    return found
+
+
+def _paths(sol: Solution) -> dict[str, Any]:
+    """Extremes of the coordinates of points that the scene names: of the samples."""
+    found: dict[str, Any] = {}
+    for info in sol.manifest.outputs:
+        if info.name.startswith("point.") and info.name.endswith((".x", ".y")) and info.name in sol:
+            values = statistics(sol.t, sol[info.name])
+            found[info.name] = _numbers(info.name, info.unit, min=values.minimum, max=values.maximum)
+            found[info.name]["searched"] = {"min": "samples", "max": "samples"}
     return found
 
 

@@ -60,6 +60,8 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
+        if name.startswith("point."):  # the size of a machine, not of a clearance
+            factor, unit = 1e3, "mm"
         dust = rounding.get(item["unit"], 0.0)
         found = {name: tuple(_cell(item, key, factor, dust) for key in columns)}
         for key, value in item.items():

@@ -50,6 +50,7 @@ _FIRST = (
     ("reaction.", "load."),
     ("drive_torque", "drive_work", "drive_power"),
     ("driver.",),
+    ("point.",),
     ("inner.x", "inner.y", "outer.x", "outer.y"),
     ("frequencies.",),
 )
@@ -80,6 +81,8 @@ def inside(words: str) -> str:
 def row_place(manifest: Manifest, name: str) -> int | None:
     """Place of a number among those a reader wants first; None for the others."""
     own = _of_bearing(manifest, name)[1]
+    if own.startswith("point.") and not own.endswith((".x", ".y")):  # velocities of coupler points
+        return None
     return next((place for place, begins in enumerate(_FIRST) if own.startswith(begins)), None)
 
 
