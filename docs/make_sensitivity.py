@@ -87,7 +87,8 @@ def main() -> None:
     report = model.sensitivity([PEAK, RMS], list(PARAMETERS))
     relative = np.array([sign * change for change in CHANGES for sign in (-1.0, 1.0)])
     lines = [
-        "| parameter | peak ball force, %/% | verdict | linear up to | rms vibration, %/% | verdict | linear up to |",
+        "| parameter | peak ball force, % per % | verdict | linear up to | "
+        "rms vibration, % per % | verdict | linear up to |",
         "| --- | ---: | --- | ---: | ---: | --- | ---: |",
     ]
     ranked = sorted(PARAMETERS, key=lambda name: -abs(report[PEAK, name].dimensionless))

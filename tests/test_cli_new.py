@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 from ballpass.derive import generate, read_scene
 from ballpass.runtime import RequestError, load_solution
 from ballpass.runtime.app.cli import ASK, DESCRIBE, SIMULATE, app
+from ballpass.runtime.app.commands.data_set_spec import read_spec
 from ballpass.runtime.contract.extras import need
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -63,8 +64,8 @@ def call_without(missing: str, folder: Path, *words: str | Path, run: str = MAIN
 
 
 def test_new_copies_each_shipped_scene_byte_for_byte_and_no_file_twice(tmp_path: Path) -> None:
-    names = [line.split()[0] for line in call("new", "--list").stdout.splitlines()]
-    assert {"press", "four-bar", "rotor", "toggle"} <= set(names)
+    names = [line.split()[0] for line in call("new", "--list").stdout.splitlines() if "Data set: " not in line]
+    assert {"press", "four-bar", "engine", "rotor", "toggle"} <= set(names)
     for name in names:
         assert call("new", name, tmp_path / "a b").exit_code == 0
     copies = sorted((tmp_path / "a b").iterdir())
@@ -92,6 +93,19 @@ def test_new_prints_the_command_that_runs_the_copy(tmp_path: Path, monkeypatch: 
     assert unknown.exit_code == 2
     assert "rotor" in unknown.stderr
     assert call("new").exit_code == 2
+
+
+def test_new_copies_a_data_set_with_its_scene_and_keeps_a_scene_that_is_there(tmp_path: Path) -> None:
+    assert "bearing-faults" in call("new", "--list").stdout
+    done = call("new", "bearing-faults", tmp_path)
+    assert done.stdout.splitlines()[-1] == f"Next: ballpass dataset {tmp_path / 'bearing_faults.toml'}"
+    spec = read_spec(tmp_path / "bearing_faults.toml")
+    assert {one.label for one in spec.classes} == {"healthy", "outer", "inner", "ball"}
+    (tmp_path / "bearing_faults.toml").unlink()
+    (tmp_path / "rotor.toml").write_text("mine", encoding="utf-8")
+    done = call("new", "bearing-faults", tmp_path)
+    assert (done.exit_code, "there already" in done.stdout) == (0, True)
+    assert (tmp_path / "rotor.toml").read_text(encoding="utf-8") == "mine"
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ each checked by a second route.
 """
 
 # %%
-# %/% says by how many per cent the force changes when the number grows by one.
+# "% per %" says by how many per cent the force changes when the number grows by one.
 import matplotlib.pyplot as plt
 
 from ballpass.derive import generate, shipped_scenes
@@ -27,7 +27,7 @@ names = [
 report = model.sensitivity("peak_ball_force", names)
 for pair in report.of("peak_ball_force"):
     verdict = pair.check.verdict.value
-    print(f"{pair.parameter:36} {pair.dimensionless:+.4f} %/%  {verdict}")
+    print(f"{pair.parameter:36} {pair.dimensionless:+.4f} % per %  {verdict}")
 
 # %%
 # Ranked as a tornado chart. Bars to the left are numbers that lower the force as they

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from ballpass.derive import shipped_scenes
+from ballpass.derive.scene.shipped import shipped_data_sets
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -13,6 +14,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 def test_every_shipped_scene_has_a_picture_three_sentences_its_file_and_a_live_page() -> None:
     _, *sections = re.split(r"^## ", (DOCS / "machines.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
     found = {}
+    assert f"`ballpass new {next(iter(shipped_data_sets()))}`" in sections.pop()
     for section in sections:
         (name,) = re.findall(r"`ballpass new ([a-z-]+)`", section)
         (scene,) = re.findall(r"\.\./scenes/(\w+)\.toml", section)

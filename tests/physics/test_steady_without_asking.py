@@ -88,7 +88,7 @@ def test_run_warns_of_an_extreme_in_its_first_turns(tmp_path: Path, monkeypatch:
     said = {name: CliRunner().invoke(app, ["run", f"{name}.toml", "--no-figures"]) for name in ("falling", "resting")}
     assert all(done.exit_code == 0 for done in said.values())
     words = " ".join(said["falling"].stderr.split())
-    assert "extremes of the start, not of the steady machine: ball.force has its max of" in words
+    assert "force of each ball (ball.force) has its max of" in words
     assert "in turn 1, and later turns have" in words
     assert "ball.force has its" not in said["resting"].stderr
 

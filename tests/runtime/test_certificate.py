@@ -76,7 +76,6 @@ def test_an_effect_of_the_start_that_has_died_out_is_called_nothing(make_model: 
     assert rows[names[1]]["nothing"] is False
     (line,) = [line for line in str(report).splitlines() if names[0] in line]
     assert "~0 (<" in line
-    assert "verified: ~0" in line
     assert f"{start.derivative:.4g}" not in line
     assert "1 of them ~0" in str(report)
     assert repr(report).count("\n") == 0

@@ -28,11 +28,13 @@ from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
+from ballpass.runtime.plot.shapes import links, used_points
 from ballpass.runtime.plot.style import (
     INK,
     PALE,
     SAND,
     SIGNAL,
+    TORQUE,
     caption,
     caption_of,
     decade_words,
@@ -43,6 +45,9 @@ from ballpass.runtime.plot.style import (
 )
 
 Run = tuple[Model, Solution]
+
+#: Points of a coupler, one of which no joint has.
+COUPLER = 'points = { B = "origin", C = "100 mm", P = ["50 mm", "60 mm"] }'
 
 
 @pytest.fixture(scope="module")
@@ -436,10 +441,38 @@ def test_a_motor_s_torque_turns_around_its_joint_and_the_punch_acts_in_its_windo
         assert ("punch\n8965 N" in written) is acts
         torque = float(record.values("drive_torque")[sample])
         assert f"drive\n{abs(torque):.3g} N·m" in written
-        x, y = next(line for line in axes.get_lines() if line.get_color() == SAND).get_xydata().T
+        x, y = next(line for line in axes.get_lines() if line.get_color() == TORQUE).get_xydata().T
         assert np.sign(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) == np.sign(torque)  # around the origin, joint A
         senses.add(np.sign(torque))
     assert senses == {-1.0, 1.0}
+
+
+def test_a_load_curve_covers_all_turns_of_a_force_s_table(make_model: Callable[..., Model]) -> None:
+    """A four-stroke engine fires in one turn of two: the last turn alone may show the other one."""
+    model = make_model("engine")
+    for cycles in (4, 5):
+        found = model.simulate(cycles=cycles, transient=2)
+        axes = draw("load_curve", model, found).axes
+        assert axes[0].get_xlim() == (0.0, 720.0)
+        angle, force = axes[1].get_lines()[0].get_xydata().T
+        assert force.min() == pytest.approx(found["reaction.A.y"].min(), rel=1e-9)
+        assert 90.0 < angle[np.argmin(force)] < 120.0  # behind top dead centre with ignition
+
+
+def test_a_body_is_drawn_around_its_points_and_its_centre_and_coupler_points_are_named(
+    make_model: Callable[..., Model],
+) -> None:
+    model = make_model("four_bar", ('points = { B = "origin", C = "100 mm" }', COUPLER))
+    record = gather(model, model.simulate(cycles=1, transient=0))
+    axes = Figure().add_subplot()
+    draw_mechanism(axes, record, 0)
+    assert "P" in [item.get_text() for item in axes.texts]
+    place = record.points(float(record.t[0]), record.state(0))
+    corners = {key[1] for key in dict(links(used_points(record.mechanism), place, 0.2))["coupler"]}
+    assert corners == {"B", "C", "P"}  # the centre of mass lies within
+    heavy = {**place, ("coupler", "center_of_mass"): place["coupler", "P"] * 2.0 - place["coupler", "B"]}
+    corners = {key[1] for key in dict(links(used_points(record.mechanism), heavy, 0.2))["coupler"]}
+    assert "center_of_mass" in corners  # beside them: it is a corner
 
 
 @pytest.mark.parametrize("angle", [0.0, 45.0, 90.0, 170.0, 240.0, 300.0])

@@ -274,7 +274,7 @@ def run(
             note(words)
         if asked_for:
             summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
-        turned = add_turns(summary, longer, instead=turns is not None) if longer is not None else ""
+        turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
         summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())

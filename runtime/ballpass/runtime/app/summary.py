@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ballpass.runtime.app.summary_words import inside, row_place, row_words
 from ballpass.runtime.ask.observables import statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, has_quantities, refine_peaks, run_of
 from ballpass.runtime.contract import Manifest
@@ -106,6 +107,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     summary |= _forces(model, steady, peaks)
     summary |= _conditioning(model, steady)
     summary |= _balls(manifest, peaks)
+    summary |= _paths(steady)
     summary |= _motions(steady)
     summary |= _constants(steady)
     if growth is not None:
@@ -157,7 +159,7 @@ def _unusual(sol: Solution) -> list[str]:
     return said
 
 
-def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str:
+def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, instead: bool) -> str:
     """Add the results of more turns to a summary (``longer``).
 
     Parameters
@@ -170,7 +172,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     A sentence: which results change, over how many turns.
     """
     told: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
-    lines: list[tuple[float, str]] = []
+    lines: list[tuple[bool, float, str]] = []
     for name, found in longer.reductions.items():
         entry, numbers = _printed(name, found)
         if entry not in summary:
@@ -189,7 +191,10 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
             if change == math.inf or (counts and change > PEAKS):
                 now, first = (f"{factor * number:z.4g}" for number in (value, before))
                 than = f"instead of {first}" if now != first else "as before"
-                lines.append((change, f"{entry}.{kind} {now} {shown} {than}"))
+                row = f"{entry}.{kind}" if kind in _BALL_FORCES else entry
+                words = inside(row_words(manifest, row)) + ("" if kind in _BALL_FORCES else f", {kind}")
+                # rows of the table before those that it leaves out
+                lines.append((row_place(manifest, row) is None, -change, f"{words} {now} {shown} {than}"))
         if instead:
             summary[entry] |= told[entry]
             for key in numbers.keys() & _BALL_FORCES.keys():
@@ -205,14 +210,15 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     summary["longer"] = told
     if instead:
         summary["steady_cycles"] = told["turns"]
-        return f"{longer.words}. Samples and figures are those of the first turns."
-    over = f"over {longer.turns} steady turns"
+        words = longer.told(lambda name: inside(row_words(manifest, name)))
+        return f"{words}. Samples and figures are those of the first turns."
+    over = f"Over {longer.turns} steady turns"
+    lines.sort(key=lambda line: line[:2])
     if longer.settled:
         rest = f"peaks change by at most {100.0 * PEAKS:g} % of their range, rms by at most {100.0 * MEANS:g} %."
-        return f"{over}: {', '.join([*(text for change, text in lines if change == math.inf), rest])}"
-    lines.sort(key=lambda line: -line[0])
-    more = f", and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
-    return f"{over}: {', '.join(text for _, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
+        return f"{over}: {'; '.join([*(text for _, change, text in lines if change == -math.inf), rest])}"
+    more = f"; and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
+    return f"{over}: {'; '.join(text for *_, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
 
 
 def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
@@ -323,6 +329,17 @@ def _motions(sol: Solution) -> dict[str, Any]:
         found[info.name] = _numbers(info.name, info.unit, **_moments(values))
         where = "samples" if reduced is None else "every step"
         found[info.name]["searched"] = {"min": where, "max": where}
+    return found
+
+
+def _paths(sol: Solution) -> dict[str, Any]:
+    """Extremes of the coordinates of points that the scene names: of the samples."""
+    found: dict[str, Any] = {}
+    for info in sol.manifest.outputs:
+        if info.name.startswith("point.") and info.name.endswith((".x", ".y")) and info.name in sol:
+            values = statistics(sol.t, sol[info.name])
+            found[info.name] = _numbers(info.name, info.unit, min=values.minimum, max=values.maximum)
+            found[info.name]["searched"] = {"min": "samples", "max": "samples"}
     return found
 
 

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
 
+#: What counts as rounding, over the largest number of the same unit [1].
+ROUNDING = 1e-13
+
 #: Parts of the table's caption about the run, with their words.
 _RUN = {
     "rtol": "rtol {}",
@@ -52,11 +55,15 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
     columns = ("value", "min", "max", "rms")
     rows: list[tuple[float, tuple[str, ...]]] = []
     left_out = 0
+    rounding = _rounding(summary)
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
-        found = {name: tuple(_cell(item, key, factor) for key in columns)}
+        if name.startswith("point."):  # the size of a machine, not of a clearance
+            factor, unit = 1e3, "mm"
+        dust = rounding.get(item["unit"], 0.0)
+        found = {name: tuple(_cell(item, key, factor, dust) for key in columns)}
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
                 # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
@@ -82,16 +89,30 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
     return table, left_out
 
 
-def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table, with a star where more samples may show more.
+def _rounding(summary: Mapping[str, Any]) -> dict[str, float]:
+    """By unit, what is rounding beside the largest number of the table: forces of 1e-14 N are none."""
+    largest: dict[str, float] = {}
+    for item in summary.values():
+        if isinstance(item, Mapping) and "unit" in item:
+            sizes = [abs(item[key]) for key in ("min", "max") if key in item]
+            largest[item["unit"]] = max([largest.get(item["unit"], 0.0), *sizes])
+    return {unit: ROUNDING * size for unit, size in largest.items()}
+
+
+def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -> str:
+    """A number of the table, with a star where more samples may show more; 0 where it is rounding alone.
 
     Where it has no digits, with twice its standard deviation over moved starts, or how far it is from their mean.
     """
     if key not in item:
         return ""
+    if abs(item[key]) < dust:
+        return "0"
     spread = item.get("over_starts", {}).get(key)
     if spread is not None:
         apart = max(2.0 * spread["std"], abs(item[key] - spread["mean"]))
+        if apart < 5e-5 * abs(item[key]):  # the digits that are printed hold
+            return f"{factor * item[key]:z.4g}"
         return f"{factor * item[key]:z.3g} ± {factor * apart:.1g}"
     star = "*" if item.get("searched", {}).get(key) == "samples" else ""
     return f"{factor * item[key]:z.4g}{star}"

@@ -50,6 +50,7 @@ _FIRST = (
     ("reaction.", "load."),
     ("drive_torque", "drive_work", "drive_power"),
     ("driver.",),
+    ("point.",),
     ("inner.x", "inner.y", "outer.x", "outer.y"),
     ("frequencies.",),
 )
@@ -72,9 +73,16 @@ def row_words(manifest: Manifest, name: str) -> str:
     return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
 
 
+def inside(words: str) -> str:
+    """Words of a row within a sentence."""
+    return words[:1].lower() + words[1:]
+
+
 def row_place(manifest: Manifest, name: str) -> int | None:
     """Place of a number among those a reader wants first; None for the others."""
     own = _of_bearing(manifest, name)[1]
+    if own.startswith("point.") and not own.endswith((".x", ".y")):  # velocities of coupler points
+        return None
     return next((place for place, begins in enumerate(_FIRST) if own.startswith(begins)), None)
 
 

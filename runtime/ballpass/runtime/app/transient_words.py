@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ballpass.runtime.app.summary import TABLE_UNITS
+from ballpass.runtime.app.summary_words import inside, row_words
 from ballpass.runtime.certify.transient import still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.quantity.grammar import channels_of
@@ -78,8 +79,9 @@ def _start_words(model: Model, longer: Settled) -> str:
     length = longer.reductions.cycle_length
     turn = "" if length is None else f", in turn {int(time / length) + 1}"
     more = f", and {len(names) - 1} more" if len(names) > 1 else ""
+    words = inside(row_words(model.manifest, names[0]))
     return (
-        f"extremes of the start, not of the steady machine: {names[0]} has its {kind} of {factor * value:.4g} {shown} "
-        f"at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
+        f"extremes of the start, not of the steady machine: {words} ({names[0]}) has its {kind} of "
+        f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
         "(--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
     )

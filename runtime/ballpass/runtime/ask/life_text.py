@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, StateStrength
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
+from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
@@ -65,6 +66,11 @@ class LifeReport(Reported):
             for words in bearing.beyond
         )
 
+    @property
+    def has_lives(self) -> bool:
+        """Whether the rings turn against each other, in any state."""
+        return any(bearing.lives for state in self.states for bearing in state.bearings)
+
     def _report(self) -> Report:
         facts = asdict(self)
         for state, plain in zip(self.states, facts["states"], strict=True):
@@ -94,7 +100,8 @@ class LifeReport(Reported):
         return Report(
             title=f"{self.title}: strength and life of its bearings",
             parts=[*(part for state in self.states for part in _state_parts(state))]
-            + [part for life in self.duty for part in _duty_parts(life)],
+            + [part for life in self.duty for part in _duty_parts(life)]
+            + [f"  by {reading}: {words}" for reading, words in READINGS.items() if self.has_lives],
             facts=facts,
             records=records,
             index=("state", "bearing", "reading"),

@@ -235,32 +235,47 @@ def _rank(pair: Sensitivity) -> tuple[bool, float]:
 def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
     """Parameters ranked by the size of the dimensionless derivative.
 
-    Parameters that are zero have none and stand apart, ranked by dQ/dp times a natural change of the parameter.
+    Parameters that are zero have none and stand apart, ranked by the derivative times a natural change of them.
+    Verdicts have a column where they are not all the same.
     """
     ranked = report.of(quantity.name)
     zero = [pair for pair in ranked if pair.value == 0.0 or pair.parameter_value == 0.0]
-    rows = _rows([pair for pair in ranked if pair not in zero])
-    without = zero
-    sections = [len(rows)] if without else []
-    if without:
+    judged = any(pair.check.verdict is not Verdict.VERIFIED or _bounded(pair) for pair in ranked)
+    rows = _rows([pair for pair in ranked if pair not in zero], judged=judged)
+    sections = [len(rows)] if zero else []
+    if zero:
         what = "quantity" if quantity.value == 0.0 else "parameter"
-        rows += [(Marked(f"{what} is 0: no %/%, see dQ/dp", "head"),), *_rows(without)]
+        rows += [(Marked(f"{what} is 0: no % per %", "head"),), *_rows(zero, judged=judged)]
     return ReportTable(
         title=_title(quantity),
-        heads=("parameter", "p/Q dQ/dp", "dQ/dp", "unit", "apart", "verdict"),
+        heads=("parameter", "% per %", "derivative", *(["verdict"] if judged else [])),
         rows=rows,
-        right=("p/Q dQ/dp", "dQ/dp", "apart"),
+        right=("% per %",),
         wrapped=("verdict",),
         caption="; ".join(quantity.notes),
         sections=sections,
     )
 
 
-def _rows(ranked: Sequence[Sensitivity]) -> list[tuple[Words, ...]]:
-    """Rows of one section."""
-    shown = [pair for rank, pair in enumerate(ranked) if rank < ROWS or pair.check.verdict is Verdict.DISAGREES]
-    hidden = len(ranked) - len(shown)
-    return [*map(_row, shown), *([(Marked(f"{hidden} more, smaller", "faint"),)] if hidden else [])]
+def _rows(ranked: Sequence[Sensitivity], *, judged: bool) -> list[tuple[Words, ...]]:
+    """Rows of one section; of parameters without influence no more than a few."""
+    shown: list[Sensitivity] = []
+    smaller = nothing = 0
+    for rank, pair in enumerate(ranked):
+        if pair.check.verdict is Verdict.DISAGREES:
+            shown.append(pair)
+        elif pair.is_nothing and sum(one.is_nothing for one in shown) >= LISTED:
+            nothing += 1
+        elif rank < ROWS:
+            shown.append(pair)
+        else:
+            smaller += 1
+    more = [f"{smaller} more, smaller"] * bool(smaller) + [f"{nothing} more without influence, ~0"] * bool(nothing)
+    return [*(_row(pair, judged=judged) for pair in shown), *((Marked(words, "faint"),) for words in more)]
+
+
+def _bounded(pair: Sensitivity) -> bool:
+    return pair.check.bounded and not pair.is_nothing
 
 
 def _title(quantity: QuantityValue) -> str:
@@ -272,16 +287,14 @@ def _title(quantity: QuantityValue) -> str:
     return words
 
 
-def _row(pair: Sensitivity) -> tuple[Words, ...]:
+def _row(pair: Sensitivity, *, judged: bool) -> tuple[Words, ...]:
     check = pair.check
     relative = f"{pair.dimensionless:+z.4f}" if math.isfinite(pair.dimensionless) else "–"
-    size = max(abs(pair.by_steps), abs(check.value or 0.0))
-    apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
     number, words = f"{pair.derivative:z.4g}", check.verdict.value
     if pair.is_nothing:
         # digits that no check verifies are not shown
         relative = "~0" if math.isfinite(pair.dimensionless) else relative
-        number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
+        number, words = f"~0 (<{check.quantum:.0e})", f"{words}: ~0"
     elif math.isnan(pair.derivative):
         number, words = "unknown", f"{words}: no digit in common"
     elif check.sides is not None:
@@ -291,7 +304,8 @@ def _row(pair: Sensitivity) -> tuple[Words, ...]:
         words += "" if pair.route == STEPS else f": by {pair.route}"
     elif check.bounded:
         words += f" to ±{check.quantum:.0e}"
-    return (pair.parameter, relative, number, pair.unit, apart, Marked(words, _LOOKS[check.verdict]))
+    verdict = [Marked(words, _LOOKS[check.verdict])] if judged else []
+    return (pair.parameter, relative, f"{number} {pair.unit}", *verdict)
 
 
 def _remarks(report: SensitivityReport) -> list[Words]:
@@ -302,10 +316,11 @@ def _remarks(report: SensitivityReport) -> list[Words]:
     nothing = sum(pair.is_nothing for pair in report.pairs)
     if nothing:
         words += f" ({nothing} of them ~0: both routes below the bound shown, no digit of the derivative is verified)"
-    lines: list[Words] = [
-        f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")
-    ]
-    lines.append("p/Q dQ/dp: % per %; dQ/dp in SI units, angles in radians")
+    lines: list[Words] = [f"{len(report.pairs)} derivatives: {words}{_farthest(report, route)}"]
+    lines.append(
+        "% per %: by how many per cent the quantity grows when the parameter grows by one; derivatives in SI units, "
+        "angles in radians"
+    )
     lines += [
         Marked(
             "disagrees",
@@ -338,6 +353,18 @@ def _remarks(report: SensitivityReport) -> list[Words]:
         lines.append(Marked("grazing", "doubt", words))
         lines += [f"  {describe(items)}" for items in places[:LISTED]]
     return lines
+
+
+def _farthest(report: SensitivityReport, route: str | None) -> str:
+    """How far verified derivatives are from the second route, at most."""
+    apart = [
+        pair.check.disagreement / max(abs(pair.by_steps), abs(pair.check.value or 0.0))
+        for pair in report.pairs
+        if pair.check.verdict is Verdict.VERIFIED
+        and pair.check.disagreement
+        and not (pair.is_nothing or _bounded(pair))
+    ]
+    return f"; verified ones are within {max(apart):.0e} of themselves from {route}" if apart else ""
 
 
 def _known(value: float, uncertainty: float) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import Points, exaggeration, guide_direction, links, used_points
+from ballpass.runtime.plot.shapes import Points, coupler_points, exaggeration, guide_direction, links, used_points
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import MechanismInfo
@@ -188,7 +188,11 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
         if mechanism.driver
         else None,
         "masses": [shown.index(key) for key in shown if key[1] == "center_of_mass"],
-        "names": [{"at": at, "text": ", ".join(words)} for at, words in names.items()],
+        "tracers": [shown.index(key) for key in coupler_points(mechanism)],
+        "names": [
+            *({"at": at, "text": ", ".join(words)} for at, words in names.items()),
+            *({"at": shown.index(key), "text": key[1]} for key in coupler_points(mechanism)),
+        ],
         "forces": [
             *_reactions(record, samples, shown),
             *_applied(record, samples, shown),

@@ -43,7 +43,8 @@ def explore_page(model: PointModel, solution: Solution, *, units: Mapping[str, s
     records = records_of(model, solution, None)
     angle = records[0].crank_angle()
     turned = abs(float(angle[-1] - angle[0])) / TURN
-    frames = choose_frames(records, turns=min(1.0, turned) or 1.0)
+    cycle = records[0].cycle_turns
+    frames = choose_frames(records, turns=min(float(cycle), turned) or 1.0)
     numbers = to_plain(frames)
     numbers["solver"] = solver_columns(frames.first, numbers) | {
         "module": base64.b64encode(gzip.compress(web_assembly(model), mtime=0)).decode(),

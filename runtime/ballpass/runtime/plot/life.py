@@ -110,7 +110,7 @@ def life_of_clearance(
         panel.plot(1e6 * clearances, values / MILLION, **_LOOKS[name])
     panel.axvline(1e6 * present, color="#6c757d", linewidth=1.0, linestyle=":")
     panel.set(xlabel="diametral clearance in operation [µm]", ylabel="rating life $L_{10r}$ [million turns]")
-    panel.set_ylim(bottom=0.0)
+    panel.margins(x=0.0)
     panel.legend(loc="best")
     shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""
     words = f"{len(clearances)} runs of {turns:.4g} steady turns. Dotted: the scene's clearance.{shaded}"

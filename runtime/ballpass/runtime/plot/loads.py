@@ -36,7 +36,7 @@ def reaction_joints(record: Record) -> tuple[str, ...]:
 
 @styled
 def load_curve(record: Record) -> Figure:
-    """Joint reactions, load on the inner ring and drive torque over the crank angle of the last turn."""
+    """Joint reactions, load on the inner ring and drive torque over the crank angle of the last turn or cycle."""
     joints = reaction_joints(record)
     ring_load = record.ring_load()
     with_torque = record.has("drive_torque")
@@ -45,7 +45,8 @@ def load_curve(record: Record) -> Figure:
     rows = len(joints) + with_torque
     figure = new_figure(1.3 + 1.9 * rows, layout=None)
     grid = figure.add_gridspec(rows, 2)
-    angle, order = _last_turn(record)
+    turns = min(record.cycle_turns, len(record.turns))
+    angle, order = _last_turns(record, turns)
     bodies = {item[0]: (item[2], item[4]) for item in record.mechanism.joints}
     panels: list[Axes] = []
     for row, joint in enumerate(joints):
@@ -55,25 +56,26 @@ def load_curve(record: Record) -> Figure:
             if joint:
                 first, second = bodies[joint]
                 title = f"{axis} at {joint}: {second} on {first}"
-                _curve(axes, angle, record.values(f"reaction.{joint}.{axis}")[order], FIRST, "reaction of the joint")
+                values = record.values(f"reaction.{joint}.{axis}")[order]
+                _curve(axes, angle, values, FIRST, "reaction of the joint", turns)
             if ring_load is not None and row == 0:
-                _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring")
+                _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring", turns)
             axes.set_title(title)
             axes.set_ylabel(f"force along {axis} [N]")
             panels.append(axes)
     if with_torque:
         axes = figure.add_subplot(grid[rows - 1, :])
-        _curve(axes, angle, record.values("drive_torque")[order], FIRST, "")
+        _curve(axes, angle, record.values("drive_torque")[order], FIRST, "", turns)
         axes.set_title("torque of the drive on the driven body")
         axes.set_ylabel("torque [N·m]")
         panels.append(axes)
     _flatten_noise(panels[: 2 * len(joints)])
     windows = record.load_windows()
     for axes in panels:
-        axes.set_xlim(0.0, 360.0)
-        axes.set_xticks(np.arange(0.0, 361.0, 60.0))
+        axes.set_xlim(0.0, 360.0 * turns)
+        axes.set_xticks(np.linspace(0.0, 360.0 * turns, 7 if turns < 3 else 2 * turns + 1))
         axes.axhline(0.0, color=GREY, linewidth=0.6)
-        shade_windows(axes, windows, (0, -1))
+        shade_windows(axes, windows, range(-1, turns))
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.05 * (high - low))
     for axes in panels[-1:] if with_torque else panels[-2:]:
@@ -81,12 +83,13 @@ def load_curve(record: Record) -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     legend_above(figure, handles, labels)
     shaded = " Shaded: an applied load acts." if windows else ""
+    shown = "One turn" if turns == 1 else f"{turns} turns"
     frame(
         figure,
         record.title(
             "Load curve of the inner ring" if record.bearing is not None else "Joint reactions and drive torque"
         ),
-        f"One turn; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
+        f"{shown}; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
         left=0.85,
         wspace=0.3,
         hspace=0.5,
@@ -102,19 +105,19 @@ def _flatten_noise(panels: list[Axes]) -> None:
             axes.set_ylim(-0.01 * max(heights), 0.01 * max(heights))
 
 
-def _last_turn(record: Record) -> tuple[Array, Array]:
-    """Crank angles of the last turn, increasing, within a turn [deg], and the samples' indices in that order."""
-    turn = record.turns[-1]
-    # the last sample of a turn repeats the first one's angle
-    index = np.arange(turn.start, turn.stop - 1)
-    angle = np.degrees(record.crank_angle()[index]) % 360.0
+def _last_turns(record: Record, turns: int) -> tuple[Array, Array]:
+    """Crank angles of the last turns, increasing, within these [deg], and the samples' indices in that order."""
+    window = record.last_turns(turns)
+    # the last sample repeats the first one's angle
+    index = np.arange(window.start, window.stop - 1)
+    angle = np.degrees(record.crank_angle()[index]) % (360.0 * turns)
     order = np.argsort(angle, kind="stable")
     return angle[order], index[order]
 
 
-def _curve(axes: Axes, angle: Array, values: Array, look: dict[str, object], label: str) -> None:
-    # close the turn: the curve starts and ends at the frame of the axes
-    closed_angle = np.concatenate((angle[-1:] - 360.0, angle, angle[:1] + 360.0))
+def _curve(axes: Axes, angle: Array, values: Array, look: dict[str, object], label: str, turns: int) -> None:
+    # close the turns: the curve starts and ends at the frame of the axes
+    closed_angle = np.concatenate((angle[-1:] - 360.0 * turns, angle, angle[:1] + 360.0 * turns))
     closed = np.concatenate((values[-1:], values, values[:1]))
     axes.plot(closed_angle, closed, label=label, **look)  # type: ignore[arg-type]
 

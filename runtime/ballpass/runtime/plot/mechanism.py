@@ -14,13 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import Points, guide_direction, links, used_points
-from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, arrow, write
+from ballpass.runtime.plot.shapes import Points, coupler_points, guide_direction, links, used_points
+from ballpass.runtime.plot.style import APPLIED, GREY, INK, SIGNAL, TORQUE, arrow, write
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72
 
-BAR = "#8fa3bf"
+BAR, BLOCK = "#8fa3bf", "#c9ced6"
 
 #: Radius of the arc that shows a torque, and how far it reaches for the greatest one [deg].
 _ARC, _REACH = 0.1, 250.0
@@ -152,6 +152,8 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
                 words.avoid(at, at - np.array([0.0, 0.09 * size]))
             look: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.5, "zorder": 6}
             axes.add_patch(Circle(tuple(at), 0.017 * size, **look))
+    for key in coupler_points(mechanism):
+        axes.plot(*now[key], marker="o", markersize=4.5, color=INK, zorder=6)
     forces = _seen(_forces(record, now, sample), seen.greatest)
     for one_force in forces:
         words.avoid(one_force.at, one_force.end(size, seen.greatest))
@@ -167,7 +169,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
         for k in range(3):
             words.avoid(arc[13 * k], arc[13 * k + 13], 0.05)
         side = [_COMPASS[k] for k in ((4, 3, 5) if seen.left else (0, 1, 7))]  # of a movie always the same
-        words.put(at, f"drive\n{abs(torque):.3g} N·m", 1.2 * _ARC * size, side, fontsize=9.5)
+        words.put(at, f"drive\n{abs(torque):.3g} N·m", 1.2 * _ARC * size, side, fontsize=9.5, color=TORQUE)
     _put_names(words, record, now, size)
     axes.set_xlim(seen.low[0], seen.high[0])
     axes.set_ylim(seen.low[1], seen.high[1])
@@ -211,7 +213,7 @@ class _Words:
             middle = place(way)
             inside = np.all(middle - half > self._seen.low) and np.all(middle + half < self._seen.high)
             covered = (w for centre, room, w in self._full if np.all(np.abs(middle - centre) < half + room))
-            return sum(covered, 0.0 if inside else 1.0)
+            return sum(covered, 0.0 if inside else 10.0)
 
         best = place(min(ways, key=cost))  # the first of equals
         self._full.append((best, half, 3.0))
@@ -256,7 +258,7 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
     half_length, half_width = 0.085 * size, 0.055 * size
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     corners = [at + a * half_length * direction + b * half_width * normal for a, b in signs]
-    axes.add_patch(Polygon(corners, facecolor=SAND, edgecolor=INK, linewidth=1.5, alpha=1.0, zorder=2.5))
+    axes.add_patch(Polygon(corners, facecolor=BLOCK, edgecolor=INK, linewidth=1.5, alpha=1.0, zorder=2.5))
     if not fixed:
         ends = np.array([at - 3.0 * half_length * direction, at + 3.0 * half_length * direction])
         axes.plot(*ends.T, color=INK, linewidth=1.2, zorder=2)
@@ -283,7 +285,7 @@ def _draw_spring(axes: Axes, one: Array, other: Array, size: float) -> None:
 
 
 def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
-    """Names of the joints, those at one place together."""
+    """Names of the joints, those at one place together, and of coupler points."""
     places: list[tuple[Array, list[str]]] = []
     for name, _, _, _, body, point in record.mechanism.joints:
         at = now[body, point]
@@ -292,6 +294,7 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
             places.append((at, [name]))
         else:
             shared.append(name)
+    places += [(now[key], [key[1]]) for key in coupler_points(record.mechanism)]
     for at, _ in places:
         words.avoid(at, at, 0.1)
     blocks = [now[item[4], item[5]] for item in record.mechanism.joints if item[1] == "prismatic"]
@@ -307,7 +310,7 @@ def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
         for at, force in _reactions(record, now, sample)
     ]
     for name, key, force in record.applied_forces(float(record.t[sample])):
-        found.append(_ForceArrow(name=name, at=now[key], force=force, colour=INK, pushes=True))
+        found.append(_ForceArrow(name=name, at=now[key], force=force, colour=APPLIED, pushes=True))
     for label, *ends in record.mechanism.springs:
         tension = record.spring_tension(label)
         pairs = ((ends[0], ends[1]), (ends[2], ends[3]))
@@ -318,7 +321,7 @@ def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
                 pull = float(tension[sample])
                 name = label.partition(".")[2]
                 found.append(
-                    _ForceArrow(name=name, at=now[key], force=pull * way / length, colour=INK, pushes=pull < 0.0)
+                    _ForceArrow(name=name, at=now[key], force=pull * way / length, colour=APPLIED, pushes=pull < 0.0)
                 )
     return found
 
@@ -338,9 +341,9 @@ def _draw_torque(axes: Axes, at: Array, share: float, size: float) -> Array:
 
     neck = half - 0.25 * np.sign(share)
     arc = around(np.linspace(-half, neck, 40))
-    axes.plot(*arc.T, color=SAND, linewidth=2.6, solid_capstyle="butt", zorder=6.5)
+    axes.plot(*arc.T, color=TORQUE, linewidth=2.6, solid_capstyle="butt", zorder=6.5)
     head = np.array([around(half + 0.15 * np.sign(share)), around(neck, 1.25 * _ARC), around(neck, 0.75 * _ARC)])
-    axes.add_patch(Polygon(head, facecolor=SAND, edgecolor="none", zorder=6.5))
+    axes.add_patch(Polygon(head, facecolor=TORQUE, edgecolor="none", zorder=6.5))
     return arc
 
 

@@ -35,10 +35,10 @@ def peak_moment(record: Record) -> Figure:
         words = "force on the frame" if with_bearing else "forces on the frame"
         sprung = any(record.spring_tension(label) is not None for label, *_ in record.mechanism.springs)
         if sprung or record.applied_forces(float(record.t[sample])):
-            words += ", applied force (dark)"
+            words += ", applied force (brown)"
         if record.has("drive_torque"):
             words += ", torque of the drive (arc)"
-        words += ", dashed paths of the joints. "
+        words += ", dashed paths of joints and points. "
         text += f"Left: {words}" if with_bearing else words.capitalize()
     if with_bearing:
         words, _ = record.ball_force()

@@ -13,14 +13,17 @@ from matplotlib.ticker import StrMethodFormatter
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 from ballpass.runtime.plot.record import Array, Record
-from ballpass.runtime.plot.style import FIRST, GREY, INK, SAND, SECOND, SIGNAL, frame, legend_above, new_figure, styled
+from ballpass.runtime.plot.style import FIRST, GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
 
 #: Points drawn between two samples where velocities are known: a resonance has only ten samples a period.
 _FINER = 8
 
 #: How crank harmonics and multiples of the ball-pass frequency are marked.
-_HARMONICS: dict[str, Any] = {"color": "#adb5bd", "linestyle": (0, (1, 1.5)), "linewidth": 0.7}
-_BALL_PASS: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewidth": 1.2}
+_HARMONICS: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 0.8}
+
+#: Both axes in one panel, in styles that no mark has.
+_BOTH: tuple[dict[str, Any], ...] = (FIRST | {"linewidth": 1.2}, {"color": SAND, "linestyle": "-", "linewidth": 2.4})
+_BALL_PASS: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewidth": 1.0}
 
 #: Ratio of the extents above which equal scales would squeeze the path.
 _SLIVER = 4.0
@@ -84,22 +87,27 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
     ----------
     relative : to the outer ring, with a circle of the clearance
     """
-    last = record.last_turns(1)
+    turns = record.cycle_turns
+    name = "last turn" if turns == 1 else f"last {turns} turns"
+    last = record.last_turns(turns)
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis, relative=relative)[1] for axis in "xy")
         # wide, to be seen where the last turn covers it
         axes.plot(x, y, color=SAND, linestyle="-", linewidth=2.4, label="steady turns before it")
     (t, x, _), (_, y, _) = (_path(record, last, axis, relative=relative) for axis in "xy")
     x, y = 1e6 * x, 1e6 * y
-    axes.plot(x, y, color=INK, linestyle="-", linewidth=1.1, label="last turn" if record.turns else "path")
+    axes.plot(x, y, color=INK, linestyle="-", linewidth=1.1, label=name if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
     look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}  # seen on any colour
-    axes.plot(x[0], y[0], marker="o", markersize=9, label="start of the last turn", zorder=4, **look)
-    axes.plot(x[-1], y[-1], marker="s", markersize=4.5, label="end of the last turn", zorder=5, **look)
+    axes.plot(x[0], y[0], marker="o", markersize=9, label=f"start of the {name}", zorder=4, **look)
+    axes.plot(x[-1], y[-1], marker="s", markersize=4.5, label=f"end of the {name}", zorder=5, **look)
     wide, high = (max(float(np.ptp(values)), 1e-9) for values in (x, y))
     equal = max(wide, high) < _SLIVER * min(wide, high)
     if equal:
         axes.set_aspect("equal", adjustable="datalim")
+    else:
+        words = f"not to one scale: the path is\n{wide:.3g} µm wide and {high:.3g} µm high"
+        axes.text(0.98, 0.98, words, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=GREY)
     if relative:
         around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 5e5 * record.parameter("bearing.clearance")
         if radius > 0.0:
@@ -155,7 +163,7 @@ def spectra(record: Record) -> Figure:
         else:
             axes.vlines(spectrum.frequency[shown], floor, tops, color=INK, linewidth=1.2)
             dots = shown & (spectrum.amplitude > floor)
-            axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.6)
+            axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.2)
         axes.set_title(f"{letter}) {axis} direction")
         axes.set_xlim(0.0, limit)
     crank = "crank" if record.manifest.mechanism is not None else "shaft"
@@ -195,18 +203,18 @@ def _mark(axes: Axes, limit: float, shaft: float, ball_pass: float) -> None:
 def _draw_closer(
     axes: Axes, lines: dict[str, AmplitudeSpectrum], shaft: float, ball_pass: float, crank: str, floor: float
 ) -> None:
-    """Ball pass and the nearest harmonic, x solid, y dashed."""
+    """Ball pass and the nearest harmonic, x thin and dark over y, wide and light."""
     order = round(ball_pass / shaft)
     low, high = sorted((order * shaft, ball_pass))
     margin = max(3.0 * (high - low), 10.0 * lines["x"].resolution)
     low, high = low - margin, high + margin
     _mark(axes, high, shaft, ball_pass)
-    for (axis, spectrum), look in zip(lines.items(), (FIRST, SECOND), strict=True):
+    for (axis, spectrum), look in zip(lines.items(), _BOTH, strict=True):
         shown = (spectrum.frequency >= low) & (spectrum.frequency <= high)
         tops = np.maximum(spectrum.amplitude[shown], floor)
-        axes.plot(spectrum.frequency[shown], tops, marker="." if axis == "x" else "+", label=axis, **look)
+        axes.plot(spectrum.frequency[shown], tops, label=axis, zorder=3 if axis == "x" else 2, **look)
     axes.set_xlim(low, high)
-    axes.set_title(f"c) ball pass beside harmonic {order} of the {crank}: x solid, y dashed")
+    axes.set_title(f"c) ball pass beside harmonic {order} of the {crank}: x thin and dark, y wide and light")
 
 
 def _apart(ball_pass: float, shaft: float) -> float:

@@ -30,7 +30,7 @@ const element = (parent, kind, text = "", attributes = {}) => draw(parent, kind,
 
 // An arrow from foot to tip in units of the picture; a short one is left out.
 function arrow(parent, colour) {
-  const group = draw(parent, "g", { stroke: colour, fill: colour, "stroke-width": 1.1 });
+  const group = draw(parent, "g", { stroke: colour, fill: colour, "stroke-width": 1.1, class: "force" });
   const shaft = draw(group, "line", {}), head = draw(group, "polygon", { stroke: "none" });
   return (foot, tip) => {
     const way = [tip[0] - foot[0], tip[1] - foot[1]], size = length(way);
@@ -51,8 +51,8 @@ function drawLinkage(parts) {
   let full = [];
   const covered = (box) => full.reduce((sum, one) => (Math.abs(one[0] - box[0]) < one[2] + box[2] && Math.abs(one[1] - box[1]) < one[3] + box[3] ? sum + one[4] : sum), 0);
   const avoid = (one, other, weight = 0.2) => { for (let n = 0; n < 9; n += 1) full.push([...[0, 1].map((axis) => one[axis] + (other[axis] - one[axis]) * n / 8), 0.7, 0.7, weight]); };
-  const writer = (size, weight) => {
-    const label = draw(picture, "text", { "font-size": size, "font-weight": weight, "text-anchor": "middle" });
+  const writer = (size, weight, kind = "") => {
+    const label = draw(picture, "text", { "font-size": size, "font-weight": weight, "text-anchor": "middle", class: kind });
     let kept = 0;
     return (at, words, gap) => {
       label.textContent = words;
@@ -120,7 +120,7 @@ function drawLinkage(parts) {
       for (const [one, other] of ends) avoid(place(one, k), place(other, k));
     });
   }
-  for (const [number, r, fill] of [...parts.masses.map((one) => [one, 0.7, "var(--soft)"]), ...parts.pins.map((pin) => [pin.at, 1.1, "var(--paper)"])]) {
+  for (const [number, r, fill] of [...parts.masses.map((one) => [one, 0.7, "var(--soft)"]), ...parts.pins.map((pin) => [pin.at, 1.1, "var(--paper)"]), ...parts.tracers.map((one) => [one, 0.8, "var(--ink)"])]) {
     const node = draw(picture, "circle", { r, fill, ...ink });
     moves.push((k) => { const [cx, cy] = place(number, k); set(node, { cx, cy }); });
   }
@@ -152,7 +152,7 @@ function drawLinkage(parts) {
     });
   }
   for (const force of parts.forces) {
-    const write = writer(3.3, 600);
+    const write = writer(3.3, 600, "force");
     moves.push((k) => {
       const [, end, size] = force.end(k);
       write(end, size * scale > 2 ? `${size.toFixed(0)} N` : "", 1.2);
@@ -186,7 +186,7 @@ function drawBearing(bearing) {
   draw(inner, "circle", { r: inside - wall, fill: "var(--paper)", ...ink });
   const balls = bearing.force.map((_, number) => [draw(picture, "circle", { r, stroke: "#101418", "stroke-width": 0.4 }),
     draw(picture, "text", { "font-size": 3.2, ...middle }, number + 1), draw(picture, "text", { "font-size": 3, ...middle })]);
-  const push = arrow(picture, "var(--sand)");
+  const push = arrow(picture, "var(--signal)");
   const long = bearing.load && 0.8 * (inside - wall) / highest(frames.map((k) => length(pair(bearing.load, k))));
   get("most").textContent = `${most.toFixed(0)} N`;
   get("magnified").textContent = `Clearance and displacement between the rings \u00d7${bearing.factor}. `
@@ -348,6 +348,7 @@ slider.addEventListener("input", () => { stop(); go(Number(slider.value)); });
 get("play").addEventListener("click", play);
 get("peak").addEventListener("click", () => { stop(); go(data.peak); });
 get("bearing").addEventListener("change", () => build(Number(get("bearing").value)));
+get("arrows").addEventListener("change", () => document.body.classList.toggle("bare", !get("arrows").checked));
 addEventListener("hashchange", () => { stop(); follow(); });
 addEventListener("keydown", (event) => {
   const steps = { ArrowLeft: -1, ArrowRight: 1, PageDown: -50, PageUp: 50, " ": 0 }[event.key];

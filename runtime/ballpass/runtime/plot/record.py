@@ -5,6 +5,7 @@ In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its tu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -87,6 +88,23 @@ class Record:
         values = self.solution.parameters
         return float(values[name]) if name in values else float(self.solution.constants[name])
 
+    def table_turns(self, label: str) -> int:
+        """Turns of the driver after which the table of a load repeats, named as ``force.gas``."""
+        kind, _, name = label.partition(".")
+        for number in range(1, len(self.solution.parameters)):
+            knot, part = f"mechanism.{kind}s.{name}.table.angle.{number}", f"{label}.part_angle_{number}"
+            if knot not in self.solution.parameters or part not in self.solution.constants:
+                break
+            if self.solution.constants[part] != 0.0:  # an angle in parts of what the table spans
+                return round(self.parameter(knot) / self.parameter(part))
+        return 1
+
+    @property
+    def cycle_turns(self) -> int:
+        """Turns after which all loads repeat: two for a four-stroke engine."""
+        labels = dict.fromkeys(name.rpartition(".")[0] for name in self.solution.constants if ".part_angle_" in name)
+        return math.lcm(1, *map(self.table_turns, labels))
+
     def last_turns(self, count: int) -> slice:
         """The last whole turns, at most `count`; the whole record where it holds none."""
         if not self.turns:
@@ -109,7 +127,7 @@ class Record:
     def load_windows(self) -> tuple[tuple[float, float], ...]:
         """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].
 
-        A load that acts all the turn has none.
+        A load that acts all the turn has none, and none whose table takes several turns.
         """
         full = 2.0 * np.pi
         edges = [(self.parameter(start), self.parameter(end)) for start, end in self.load_window_edges()]
@@ -120,6 +138,8 @@ class Record:
         found: list[tuple[str, str]] = []
         for item in self.manifest.inputs:
             turning = item.kind == "table" and item.rate
+            if turning and self.table_turns(item.name) > 1:
+                continue
             found += _acting_rows(item, self.parameter) if turning else item.windows
         return found
 
@@ -224,7 +244,7 @@ class Record:
             return float(np.interp(past, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
         columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
         knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
-        return float(np.interp(angle, knots, values, period=full))
+        return float(np.interp(angle, knots, values, period=full * self.table_turns(f"force.{name}")))
 
     def spring_tension(self, label: str) -> Array | None:
         """Tension of a spring or stop between two points, (n,) [N]; None where it was not asked for."""

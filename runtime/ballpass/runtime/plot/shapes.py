@@ -15,27 +15,62 @@ if TYPE_CHECKING:
 Points = dict[tuple[str, str], Array]
 
 
+#: Distance of a body's point from the figure of the others below which it belongs to that, over the picture's size.
+FLAT = 0.02
+
+
 def used_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
-    """Points of joints, of applied forces and of springs, each once."""
+    """Points of joints, of applied forces and of springs, then the others of moving bodies, each once."""
+    return [*_acting_points(mechanism), *coupler_points(mechanism)]
+
+
+def coupler_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
+    """Points of moving bodies that no joint, force or spring has; centres of mass are none."""
+    acting = {FRAME: True} | dict.fromkeys(_acting_points(mechanism), True)
+    every = ((info.body, info.point) for info in mechanism.points)
+    return [key for key in every if not {key, key[0]} & acting.keys() and key[1] != "center_of_mass"]
+
+
+def _acting_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
     joined = [key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))]
     pulled = [key for _, b, p, c, q in mechanism.springs for key in ((b, p), (c, q))]
     return list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces), *pulled]))
 
 
 def links(used: list[tuple[str, str]], now: Points, size: float) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Each moving body and its points: two ends of a bar, the corners of a plate in order, or one point."""
+    """Each moving body with the corners of its figure: two ends of a bar, those of a plate in order, or one point.
+
+    It is drawn around all its points and its centre of mass.
+    """
     found = []
     for body in dict.fromkeys(name for name, _ in used if name != FRAME):
         keys: list[tuple[str, str]] = []
         for key in used:
             if key[0] == body and all(np.hypot(*(now[key] - now[other])) > 1e-6 * size for other in keys):
                 keys.append(key)
-        corners = np.array([now[key] for key in keys])
-        around = corners - corners.mean(axis=0)
-        if len(keys) > 2:
-            keys = [keys[k] for k in np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
-        found.append((body, keys))
+        center = (body, "center_of_mass")
+        found.append((body, _outline([*keys, center] if len(keys) > 1 and center in now else keys, now, size)))
     return found
+
+
+def _outline(keys: list[tuple[str, str]], now: Points, size: float) -> list[tuple[str, str]]:
+    """Corners of the convex figure around places, counter-clockwise; those that hardly stand out are left out."""
+    if len(keys) < 3:
+        return keys
+    ordered = sorted(keys, key=lambda key: tuple(now[key]))
+
+    def half(way: list[tuple[str, str]]) -> list[tuple[str, str]]:
+        kept: list[tuple[str, str]] = []
+        for key in way:
+            while len(kept) > 1:
+                along, further = now[kept[-1]] - now[kept[-2]], now[key] - now[kept[-2]]
+                if along[0] * further[1] - along[1] * further[0] > FLAT * size * np.hypot(*further):
+                    break
+                kept.pop()
+            kept.append(key)
+        return kept[:-1]
+
+    return half(ordered) + half(ordered[::-1])
 
 
 def guide_direction(now: Points, trace: Points, guide: tuple[str, str], block: tuple[str, str]) -> Array:

@@ -131,9 +131,9 @@ function angleOf(run, row) {
 }
 
 const between = (angle, [start, end]) => ((angle - start) % TURN + TURN) % TURN < ((end - start) % TURN + TURN) % TURN;
-function interpolated(angle, knots, heights) {
-  const turned = ((angle - knots[0]) % TURN + TURN) % TURN + knots[0], next = knots.findIndex((knot) => knot > turned), n = next < 0 ? knots.length : next;
-  const [a, b] = [knots[n - 1], n < knots.length ? knots[n] : knots[0] + TURN];
+function interpolated(angle, knots, heights, period) {
+  const turned = ((angle - knots[0]) % period + period) % period + knots[0], next = knots.findIndex((knot) => knot > turned), n = next < 0 ? knots.length : next;
+  const [a, b] = [knots[n - 1], n < knots.length ? knots[n] : knots[0] + period];
   return heights[n - 1] + (heights[n % knots.length] - heights[n - 1]) * (turned - a) / (b - a);
 }
 
@@ -147,7 +147,7 @@ function forceOf(run, source, row, points) {
   let amount = 1;
   if (source.input !== undefined) amount = row[inputsAt + source.input];
   else if (source.borders) amount = Number(source.borders.some((edges) => between(angleOf(run, row), edges.map(value))));
-  else if (source.table) amount = interpolated(angleOf(run, row), ...source.table.map((places) => places.map(value)));
+  else if (source.table) amount = interpolated(angleOf(run, row), ...source.table.map((places) => places.map(value)), TURN * source.turns);
   if (amount === 0) return [0, 0];
   if (source.cartesian) return source.cartesian.map(value);
   const [size, direction] = source.polar ? source.polar.map(value) : [amount, value(source.direction)];
@@ -161,12 +161,12 @@ function loadOf(run, load, row) {
 
 const motionOf = (bearing, row) => bearing.inner.map((column, axis) => 1e6 * (row[column] - (bearing.outer ? row[bearing.outer[axis]] : 0)));
 
-// What the pictures show of a run, its last turn, in the form in which the page brings the scene's own.
+// What the pictures show of a run, its last turn or cycle of turns, in the form in which the page brings the scene's own.
 function drawnOf(run) {
   const row = (k) => run.rows.subarray(k * width, (k + 1) * width), angles = Array.from({ length: run.count }, (_, k) => angleOf(run, row(k)));
   const sense = Math.sign(angles[run.count - 1] - angles[0]), turning = sense !== 0 && angles.every((angle, k) => !k || sense * (angle - angles[k - 1]) > 0);
   let begins = 0;
-  if (turning) while (begins + 1 < run.count && Math.abs(angles[run.count - 1] - angles[begins + 1]) >= TURN * (1 - 1e-9)) begins += 1;
+  if (turning) while (begins + 1 < run.count && Math.abs(angles[run.count - 1] - angles[begins + 1]) >= TURN * solver.shown * (1 - 1e-9)) begins += 1;
   // every bearing's highest force is among the positions
   const tops = solver.bearings.map((bearing) => {
     let best = [-Infinity, begins];

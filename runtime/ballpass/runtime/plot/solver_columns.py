@@ -41,10 +41,11 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
         },
         "speed": None if speed is None else place[speed],
         "start": None if mechanism is None else place[mechanism.start_angle],
+        "shown": record.cycle_turns,
         "angle": column[mechanism.angle] if mechanism is not None and mechanism.angle else None,
         "windows": [[place[start], place[end]] for start, end in record.load_window_edges()],
         "torque": column.get("drive_torque"),
-        "linkage": None if mechanism is None else _linkage(manifest, numbers["linkage"]["forces"], place, column),
+        "linkage": None if mechanism is None else _linkage(record, numbers["linkage"]["forces"], place, column),
         "bearings": [_bearing(record, info, place, column) for info in drawn],
     }
 
@@ -55,10 +56,9 @@ def bearing_of(manifest: Manifest, name: str) -> BearingInfo | None:
 
 
 def _linkage(
-    manifest: Manifest, forces: list[dict[str, Any]], place: Mapping[str, int], column: Mapping[str, int]
+    record: Record, forces: list[dict[str, Any]], place: Mapping[str, int], column: Mapping[str, int]
 ) -> dict[str, Any]:
-    mechanism = manifest.mechanism
-    assert mechanism is not None  # of those only
+    mechanism = record.mechanism
     shown = shown_points(mechanism)
     every = [(info.body, info.point) for info in mechanism.points]
     sources: dict[str, dict[str, Any]] = {}
@@ -68,7 +68,7 @@ def _linkage(
             columns = [column[f"reaction.{name}.{axis}"] for axis in "xy"]
             sources[f"reaction.{name}"] = {"columns": columns, "sign": sign}
     for name, _, _, given in mechanism.forces:
-        sources[f"force.{name}"] = _applied(manifest, name, given, place)
+        sources[f"force.{name}"] = _applied(record, name, given, place)
     for label, *ends in mechanism.springs:
         known = next((name for name in (f"{label}.tension", f"{label}.force") if name in column), None)
         if known is not None:
@@ -79,8 +79,9 @@ def _linkage(
     return {"points": [every.index(key) for key in shown], "forces": [sources[force["name"]] for force in forces]}
 
 
-def _applied(manifest: Manifest, name: str, given: str, place: Mapping[str, int]) -> dict[str, Any]:
+def _applied(record: Record, name: str, given: str, place: Mapping[str, int]) -> dict[str, Any]:
     """As `Record.applied_forces`: components, and what says whether or how much it acts."""
+    manifest = record.manifest
     cartesian, polar = force_components(name)
     found: dict[str, Any] = {}
     if cartesian[0] in place:
@@ -99,6 +100,7 @@ def _applied(manifest: Manifest, name: str, given: str, place: Mapping[str, int]
         else:
             columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
             found["table"] = [[k for known, k in place.items() if known.startswith(one)] for one in columns]
+            found["turns"] = record.table_turns(f"force.{name}")
     return found
 
 

@@ -33,6 +33,10 @@ SAND = "#edae49"
 PALE = "#dfe3e8"
 GREY = "#6c757d"
 
+#: What is drawn of a mechanism has one colour in figures and pages: reactions `SIGNAL`, and these.
+APPLIED = "#b87503"
+TORQUE = "#3c7a5e"
+
 #: First and second signal of an axes: dark solid, lighter dashed.
 FIRST: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.4}
 SECOND: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (5, 2)), "linewidth": 1.4}

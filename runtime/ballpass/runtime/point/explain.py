@@ -122,7 +122,13 @@ class Explanation(ShortRepr, Reported):
             Marked("Breakpoints of the first turn", "head", f" {where}"),
             Marked("Smoothness", "head", f" {laws}"),
         ]
-        right = ("crank or shaft angle", "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)")
+        right = (
+            "crank or\nshaft angle",
+            "fastest\ndecay",
+            "fastest\nfrequency",
+            "slowest\nrate",
+            "decay over\nfrequency",
+        )
         rows = [
             (
                 item.name,
@@ -139,7 +145,8 @@ class Explanation(ShortRepr, Reported):
             heads=("at", *right),
             rows=rows,
             right=right,
-            caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
+            caption="Decay over frequency, with 2π: of a single mode, up to 1, its damping ratio; above 3 decay bounds "
+            "explicit steps.",
         )
         parts += ["", table] if rows else []
         parts += [f"no equilibrium at {place}" for place in self.unsupported]

@@ -337,10 +337,14 @@ def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
     return tuple(notes)
 
 
+#: Heads of columns of a mode.
+_FREQUENCIES = ("natural\n[Hz]", "damped\n[Hz]", "damping\nratio")
+
+
 def _modes_table(result: Linearization) -> ReportTable:
     where = "static equilibrium" if result.at_equilibrium else "given state"
-    words = "f: natural frequency; ratio: damping over critical damping; shapes: size and phase, the largest 1"
-    heads = ("f, Hz", "damped, Hz", "ratio", *result.coordinates)
+    words = "Damping ratio: over critical damping. Shapes: size and phase of each coordinate, the largest 1."
+    heads = (*_FREQUENCIES, *result.coordinates)
     rows = [
         (
             f"{mode.natural_frequency:.6g}",
@@ -363,7 +367,7 @@ def _faster_table(result: Linearization) -> tuple[ReportTable, ...]:
     """Frequencies and ratios of vibrations faster than the balls pass, where they are others."""
     if not result.faster_modes:
         return ()
-    heads = ("f, Hz", "damped, Hz", "ratio")
+    heads = _FREQUENCIES
     rows = [
         (f"{m.natural_frequency:.6g}", f"{m.damped_frequency:.6g}", "" if m.rigid else f"{m.damping_ratio:.4g}")
         for m in result.faster_modes
@@ -381,9 +385,13 @@ def _polar(z: complex) -> str:
 
 def _matrices_table(result: Linearization) -> ReportTable:
     """Mass, damping and stiffness as one table, a row for each coordinate."""
-    matrices = (("M kg", result.mass), ("C N·s/m", result.damping), ("K N/m", result.stiffness))
+    matrices = (
+        (("mass", "[kg]"), result.mass),
+        (("damping", "[N·s/m]"), result.damping),
+        (("stiffness", "[N/m]"), result.stiffness),
+    )
     rows = [
-        (words if k == 0 else "", name, *(f"{value:z.5g}" for value in row))
+        (words[k] if k < 2 else "", name, *(f"{value:z.5g}" for value in row))
         for words, matrix in matrices
         for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True))
     ]

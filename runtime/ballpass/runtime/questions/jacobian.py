@@ -48,15 +48,17 @@ def _report(result: CheckedJacobian) -> Report:
         or entry["sides"]
         or len(result.rows) == 1
     ]
+    agreed = all(entry["verdict"] == Verdict.VERIFIED.value for entry in shown)  # the title says so for all
     rows = []
     for entry in shown:
         value, second = (None if entry[key] is None else f"{entry[key]:z.7g}" for key in ("value", "second"))
         if entry["sides"]:
             value = "{:z.7g} or {:z.7g}".format(*entry["sides"])
-        rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], entry["verdict"]))
+        verdict = [] if agreed else [entry["verdict"]]
+        rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], *verdict))
     table = ReportTable(
         title=f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
-        heads=("of", "wrt", "derivative", "by differences", "unit", "verdict"),
+        heads=("quantity", "parameter", "derivative", "by differences", "unit", *([] if agreed else ["verdict"])),
         rows=rows,
         right=("derivative", "by differences"),
     )

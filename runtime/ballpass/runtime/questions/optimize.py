@@ -143,7 +143,7 @@ class Optimum(ShortRepr, Reported):
         ]
         table = ReportTable(
             title=f"Least {self.goal}: {self.value:.9g} {self.unit}",
-            heads=("parameter", "value", "unit", "held by", f"slopes, {self.unit} over SI"),
+            heads=("parameter", "value", "unit", "held by", f"slope [{self.unit} per SI unit]"),
             rows=[
                 (
                     one.name,

@@ -167,14 +167,17 @@ class SignalSpectrum(ShortRepr, Reported):
         ]
         across = "order" if self.orders else "frequency [Hz]"
         columns = 4 if any(self.alternatives) else 3
+        infos = (*self.solution.manifest.states, *self.solution.manifest.outputs)
+        words = next((info.description for info in infos if info.name == self.of), "")
+        height = f"{self.scaling} [{self.height_unit}]"
         table = ReportTable(
-            title=f"Highest lines of {self.of}",
-            heads=(across, self.height_unit, "line", "or (told apart by)")[:columns],
+            title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
+            heads=(across, height, "line", "or (told apart by)")[:columns],
             rows=[
                 (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name, others)[:columns]
                 for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
             ],
-            right=(across, self.height_unit),
+            right=(across, height),
         )
         marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
         s = self.statistics

@@ -262,7 +262,7 @@ def kind_of(multipliers: np.ndarray) -> str:
 
 
 def _complex(m: complex) -> str:
-    return f"{m.real:.9g} ± {abs(m.imag):.9g} i (size {abs(m):.9g})" if m.imag else f"{m.real:.9g}"
+    return f"{m.real:.6g} ± {abs(m.imag):.6g} i (size {abs(m):.9g})" if m.imag else f"{m.real:.9g}"
 
 
 def _plain(m: complex) -> dict[str, float]:

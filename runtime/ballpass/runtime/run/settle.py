@@ -14,7 +14,7 @@ second half of the turns misses an extreme of the first by more than `START` of 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -74,13 +74,17 @@ class Settled(ShortRepr):
     @property
     def words(self) -> str:
         """The result as a sentence."""
+        return self.told(str)
+
+    def told(self, called: Callable[[str], str]) -> str:
+        """The result as a sentence, with words for the name of a channel."""
         name = max(self.changes, key=lambda channel: max(self.changes[channel]))
         peak, mean = self.changes[name]
         state = "settled" if self.settled else "not settled"
         behind = f" behind {self.dropped} of transient" if self.dropped else ""
         return (
             f"peaks and rms {state} over {self.turns} steady turns{behind}: the second half changed extremes and rms "
-            f"most in {name}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
+            f"most in {called(name)}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
         )
 
 

@@ -50,7 +50,9 @@ def bearings(
             heads=heads,
             rows=rows,
             right=heads[1:],
-            caption="Balls or rollers, D_w, D_pw: derived from ratings of a catalogue.\n"
+            caption="d: bore, D: outside diameter, B: width; D_w: ball diameter, D_pw: pitch diameter.\n"
+            "C_r, C_0r: dynamic and static load rating, C_u: fatigue limit; CN: normal clearance, diametral.\n"
+            "Balls or rollers, D_w, D_pw: derived from ratings of a catalogue.\n"
             "C_r, C_0r, C_u: from these, by ISO 281 and ISO 76.",
         )
         show_parts(table)

@@ -79,7 +79,7 @@ def read_spec(path: Path) -> DataSetSpec:
         data = tomllib.loads(text)
     except (OSError, ValueError) as fault:
         problem = f"the file cannot be read: {getattr(fault, 'strerror', None) or fault}"
-        remedy = "give the path of a TOML file such as scenes/data_sets/bearing_faults.toml"
+        remedy = "give the path of a TOML file; `ballpass new bearing-faults` copies one"
         one = Fault(key="", problem=problem, given=str(path), allowed="a specification of a data set", remedy=remedy)
         raise SceneError([one], source=path) from None
     collector = Collector(lines=index_lines(text))

@@ -24,7 +24,9 @@ NAMED = 5
 def dataset(
     spec: Annotated[
         Path,
-        typer.Argument(help="What the data set is made of (TOML); scenes/data_sets/ has one.", show_default=False),
+        typer.Argument(
+            help="What the data set is made of (TOML); `ballpass new bearing-faults` copies one.", show_default=False
+        ),
     ],
     out: Annotated[
         Path | None,

@@ -24,6 +24,7 @@ from ballpass.runtime.app.commands.shared import (
     complain,
     load_model,
     name_of,
+    note,
     show,
     show_json,
     warn,
@@ -192,6 +193,8 @@ def _ask(
         show_json(plain | ({"figure": str(written[0])} if "figure" in plain and written else {}))
     else:
         show_report(report)
+        if question.figures is not None and not question.always and out is None:
+            note("figures and the report as JSON: --out DIR writes them.")
         if written:
             show(f"results in {folder}: {', '.join(path.name for path in written)}")
     if report.fault:

@@ -176,10 +176,11 @@ def _modelled(report: dict[str, Any]) -> ReportTable:
         rows.append((name, str(part["line"] or ""), part["what"], cell))
     return ReportTable(
         title="Modelled",
-        heads=("part", "line", "what", "share of rhs"),
+        heads=("part", "line", "what", "operations"),
         rows=rows,
-        right=("line", "share of rhs"),
+        right=("line", "operations"),
         wrapped=("what",),
+        caption="Operations of one evaluation of the equations of motion (rhs), and their share.",
     )
 
 

@@ -1,4 +1,4 @@
-"""``ballpass new``: a copy of a shipped scene, to run and edit."""
+"""``ballpass new``: a copy of a shipped scene or data set, to run and edit."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def _names(incomplete: str) -> list[str]:
     """Names that the shell completes; none where only the runtime is installed."""
     if not can_derive():
         return []
-    from ballpass.derive.scene.shipped import shipped_scenes
+    from ballpass.derive.scene.shipped import shipped_data_sets, shipped_scenes
 
-    return [name for name in shipped_scenes() if name.startswith(incomplete)]
+    return [name for name in (*shipped_scenes(), *shipped_data_sets()) if name.startswith(incomplete)]
 
 
 def new(
@@ -28,7 +28,7 @@ def new(
         str | None,
         typer.Argument(
             metavar="NAME",
-            help="Name of a scene: press, four-bar, rotor, toggle ...",
+            help="Name of a scene: press, four-bar, engine, rotor ...",
             show_default=False,
             autocompletion=_names,
         ),
@@ -36,23 +36,24 @@ def new(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder to copy it to; made if it does not exist.")
     ] = Path(),
-    list_: Annotated[bool, typer.Option("--list", help="Print the names and titles of all scenes.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="Print the names and titles of all.")] = False,
 ) -> None:
-    """Copy a scene that comes with ballpass into a folder. An existing file is not overwritten."""
+    """Copy a scene or a data set that comes with ballpass into a folder. An existing file is not overwritten."""
     with command():
-        from ballpass.derive.scene.shipped import shipped_scenes, title_of
+        from ballpass.derive.scene.shipped import scene_of, shipped_data_sets, shipped_scenes, title_of
 
-        scenes = shipped_scenes()
+        scenes, data_sets = shipped_scenes(), shipped_data_sets()
+        known = {**scenes, **data_sets}
         if list_:
-            width = max(map(len, scenes))
-            for known, path in scenes.items():
-                show(f"{known:<{width}}  {title_of(path)}")
+            width = max(map(len, known))
+            for each, path in known.items():
+                show(f"{each:<{width}}  {'Data set: ' if each in data_sets else ''}{title_of(path)}")
             return
         if name is None:
-            raise RequestError(f"new: no scene was named. Allowed: {', '.join(scenes)}. Their titles: --list.")
-        source = scenes.get(name.replace("_", "-")) or {path.stem: path for path in scenes.values()}.get(name)
+            raise RequestError(f"new: no scene was named. Allowed: {', '.join(known)}. Their titles: --list.")
+        source = known.get(name.replace("_", "-")) or {path.stem: path for path in known.values()}.get(name)
         if source is None:
-            raise RequestError(f"new: {unknown_name('scene', name, scenes)}")
+            raise RequestError(f"new: {unknown_name('scene', name, known)}")
         if folder.suffix == ".toml" or folder.is_file():
             raise RequestError(
                 f"new: {folder} must be the folder for the copy, {source.name}. Allowed: a folder, "
@@ -60,12 +61,28 @@ def new(
             )
         folder.mkdir(parents=True, exist_ok=True)
         target = folder / source.name
-        try:
-            with target.open("x", encoding="utf-8") as copy:
-                copy.write(source.read_text(encoding="utf-8"))
-        except FileExistsError:
-            raise RequestError(
-                f"{target} exists already and was not overwritten. Allowed: a folder without it. Give another folder, "
-                "or move the file."
-            ) from None
-        show(f"{target}\nNext: ballpass run {shlex.quote(str(target))}")
+        if source in scenes.values():
+            _write(target, source.read_text(encoding="utf-8"))
+            show(f"{target}\nNext: ballpass run {shlex.quote(str(target))}")
+            return
+        scene, text = scene_of(source)
+        beside = folder / scene.name
+        _write(target, text)
+        show(str(target))
+        if beside.exists():
+            show(f"{beside}: its scene, which was there already")
+        else:
+            _write(beside, scene.read_text(encoding="utf-8"))
+            show(f"{beside}: its scene")
+        show(f"Next: ballpass dataset {shlex.quote(str(target))}")
+
+
+def _write(target: Path, text: str) -> None:
+    try:
+        with target.open("x", encoding="utf-8") as copy:
+            copy.write(text)
+    except FileExistsError:
+        raise RequestError(
+            f"{target} exists already and was not overwritten. Allowed: a folder without it. Give another folder, "
+            "or move the file."
+        ) from None

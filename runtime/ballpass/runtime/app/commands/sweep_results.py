@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.many.ensemble import EnsembleResult
 
+#: Characters of a column's head in one line.
+HEAD = 13
+
 #: Files of a sweep, beside a figure for each quantity.
 TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
 
@@ -227,5 +230,8 @@ class Sweep:
 
 
 def _head(name: str, unit: str) -> str:
-    """A column's head, the unit in a line of its own."""
-    return f"{name}\n[{unit}]"
+    """A column's head: a long name in several lines, broken behind its signs, the unit in a line of its own."""
+    lines = [""]
+    for part in re.split(r"(?<=[._:])", name):
+        lines = [*lines[:-1], lines[-1] + part] if len(lines[-1] + part) <= HEAD else [*lines, part]
+    return "\n".join([*filter(None, lines), f"[{unit}]"])
