@@ -11,12 +11,13 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
-from ballpass.derive.scene.bearing_records import Lubrication
+from ballpass.derive.scene.bearing_records import DIRT, Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.read_keys import read_record
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import DutyState, Scene
-from ballpass.derive.scene.table import Table
+from ballpass.derive.scene.table import Table, listing
 from ballpass.derive.scene.units import show
+from ballpass.runtime.ratings.lubrication import FILTERS
 
 #: Shares of all states add up to one within this [1].
 SHARES = 1e-6
@@ -91,4 +92,19 @@ def read_lubrication(table: Table) -> Lubrication | None:
     if not table.has("lubrication"):
         return None
     with table.table("lubrication") as film:
-        return read_record(Lubrication, film)
+        DIRT.choose(film, keys_of(Lubrication))
+        found = read_record(Lubrication, film)
+        if found.oil_code is None:
+            remedy = "delete the key, or give oil_code instead of the contamination"
+            film.refuse(
+                ("filter",), "a filter belongs to the code of an oil", allowed="filter with oil_code", remedy=remedy
+            )
+        elif found.oil_code not in FILTERS[found.filter or "off line"]:
+            film.fault(
+                "oil_code",
+                "ISO 281 has no contamination factor for this code with a filter in line",
+                given=show(found.oil_code),
+                allowed=listing([*FILTERS["in line"]]),
+                remedy='write filter = "off line", or name a cleaner oil',
+            )
+        return found

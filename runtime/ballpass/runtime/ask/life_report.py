@@ -22,6 +22,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.ratings import life
+from ballpass.runtime.ratings.lubrication import contamination_of_class, contamination_of_code, viscosity
 from ballpass.runtime.ratings.of_bearing import (
     RacewayContact,
     Ratings,
@@ -185,15 +186,24 @@ def _modified(
     film = info.lubrication
     if film is None or not found:
         return None, None, None, None
-    ratio = film.viscosity_ratio
-    if ratio is None:
-        assert film.viscosity is not None  # the scene gives one of them
-        ratio = life.viscosity_ratio(film.viscosity, speed, values[f"{info.path}.pitch_diameter"])
+    ratio, pitch = film.viscosity_ratio, values[f"{info.path}.pitch_diameter"]
+    if ratio is None:  # the scene gives one of three
+        thick = film.viscosity
+        if film.oil_grade is not None and film.temperature_celsius is not None:
+            thick = viscosity(film.oil_grade, film.temperature_celsius)
+        assert thick is not None
+        ratio = life.viscosity_ratio(thick, speed, pitch)
+    contamination = film.contamination
+    if film.cleanliness is not None:
+        contamination = contamination_of_class(film.cleanliness, pitch)
+    elif film.oil_code is not None:
+        contamination = contamination_of_code(film.oil_code, film.filter or "off line", ratio, pitch)
+    assert contamination is not None
     shortest = min(found.values())
     load = life.equivalent_load(ratings.dynamic, shortest, ratings.life)
-    limit = film.contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
+    limit = contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
     factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit, ratings.life.factor))
-    return ratio, film.contamination, factor, float(life.modified_life(shortest, factor))
+    return ratio, contamination, factor, float(life.modified_life(shortest, factor))
 
 
 def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:

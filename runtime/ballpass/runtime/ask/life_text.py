@@ -175,7 +175,8 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},
     }
     if bearing.factor is not None:
-        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, viscosity ratio {bearing.viscosity_ratio:.3g}"
+        film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
+        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, {film}"
         lives[words] = bearing.modified_life
     known = {name: life for name, life in lives.items() if life is not None}
     return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]

@@ -221,7 +221,12 @@ class LubricationInfo:
 
     viscosity_ratio: float | None
     viscosity: float | None
-    contamination: float
+    contamination: float | None
+    oil_grade: str | None = None
+    temperature_celsius: float | None = None
+    cleanliness: str | None = None
+    oil_code: str | None = None
+    filter: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
