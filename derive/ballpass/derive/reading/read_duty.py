@@ -1,4 +1,4 @@
-"""The tables [duty.<state>] and [bearing.lubrication] of a scene file: inputs of the rating life beside the model.
+"""The tables [duty.<state>], [bearing.lubrication] and [bearing.alignment]: inputs of the rating life beside the model.
 
 In: the tables.  Out: records, possibly with placeholders where faults were noted.
 """
@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
-from ballpass.derive.scene.bearing_records import DIRT, Lubrication
+from ballpass.derive.scene.bearing_records import DIRT, Alignment, Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import DutyState, Scene
@@ -85,6 +85,18 @@ def _leaves(data: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
             yield from _leaves(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
+
+
+def read_alignment(table: Table) -> Alignment | None:
+    """Misalignment and shaft of a bearing; None where the scene says nothing of them."""
+    if not table.has("alignment"):
+        return None
+    with table.table("alignment", "misalignment, or span and shaft_diameter") as said:
+        found = read_record(Alignment, said)
+        for key, other in (("span", "shaft_diameter"), ("shaft_diameter", "span")):
+            if said.has(key) and not said.has(other):
+                said.take(other, keys_of(Alignment)[other].sample)
+        return found
 
 
 def read_lubrication(table: Table) -> Lubrication | None:

@@ -323,6 +323,35 @@ class Lubrication:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alignment:
+    """Tilt of the rings by misalignment [rad] and bending of the shaft [m], for a hand formula beside the life."""
+
+    misalignment: float | None = not_negative(
+        "rad",
+        "Angle between the axes of shaft and housing at the bearing",
+        example="2 arcmin",
+        setting=True,
+        optional=True,
+    )
+    span: float | None = positive(
+        "m",
+        "Distance of the two bearings of the shaft, its load in the middle",
+        example="200 mm",
+        setting=True,
+        optional=True,
+        when="with `shaft_diameter`",
+    )
+    shaft_diameter: float | None = positive(
+        "m",
+        "Diameter of the shaft, round and of steel",
+        example="20 mm",
+        setting=True,
+        optional=True,
+        when="with `span`",
+    )
+
+
 #: How dirty the lubricant is: one of these.
 DIRT = Either(what="the contamination", groups=(("contamination",), ("cleanliness",), ("oil_code",)))
 
@@ -338,8 +367,8 @@ class Bearing:
     stand side by side (None: one).
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
-    nothing of that kind.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication` and `alignment` are None where the
+    scene says nothing of that kind.
     """
 
     name: str
@@ -433,6 +462,7 @@ class Bearing:
     catalogue: Catalogue | None = None
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None
+    alignment: Alignment | None = None
 
     @property
     def prefix(self) -> str:

@@ -168,8 +168,11 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
         ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
     ]
+    if bearing.tilt is not None:
+        parts.append(f"  {bearing.tilt.words}")
     if bearing.why_no_life:
-        return [*parts, f"  No rating life. {bearing.why_no_life}"]
+        parts.append(f"  No rating life. {bearing.why_no_life}")
+        return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
     lives = {
         f"basic L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
         **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},

@@ -230,6 +230,15 @@ class LubricationInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentInfo:
+    """Tilt of a bearing's rings: see `ballpass.derive.scene.bearing_records.Alignment`; in rad and m."""
+
+    misalignment: float | None
+    span: float | None
+    shaft_diameter: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DutyInfo:
     """A state of a duty cycle: its share of the time [1], and the parameters that differ then, (name, value) [SI]."""
 
@@ -260,6 +269,7 @@ class BearingInfo:
     catalogue: CatalogueInfo | None = None
     lubrication: LubricationInfo | None = None
     element: str = "ball"
+    alignment: AlignmentInfo | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

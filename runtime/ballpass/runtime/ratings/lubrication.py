@@ -3,8 +3,9 @@
 In: grade and temperature, cleanliness.  Out: kinematic viscosity [m²/s], e_C [1].
 
 Sources: ISO 3448 (grades at 40 °C); ASTM D2270 for the viscosity at 100 °C of an oil of the viscosity index 95, as
-usual for mineral oils; ASTM D341 between and beyond (Walther).  Classes of cleanliness: ISO 281:2007.  The formulas over the
-code of ISO 4406 are those of ISO 281:2007, Annex A, as remembered: they were not compared with the printed annex.
+usual for mineral oils; ASTM D341 between and beyond (Walther).  Classes of cleanliness: ISO 281:2007.  The formulas
+over the code of ISO 4406 are those of ISO 281:2007, Annex A, as remembered: they were not compared with the printed
+annex.
 """
 
 from __future__ import annotations
@@ -88,4 +89,4 @@ def contamination_of_code(code: str, where: str, viscosity_ratio: float, pitch_d
         raise RequestError(f"No e_C for {code} with a filter {where}. Allowed: {', '.join(known)}.")
     diameter, (film, size) = 1e3 * pitch_diameter, known[code]
     share = min(film * viscosity_ratio**0.68 * diameter**0.55, 1.0)
-    return max(share * (1.0 - size / diameter ** (1.0 / 3.0)), 0.0)
+    return float(max(share * (1.0 - size / diameter ** (1.0 / 3.0)), 0.0))
