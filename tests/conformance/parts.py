@@ -130,13 +130,18 @@ def _elements() -> list[Part]:
             name=name,
             text=shipped(
                 "varying_compliance",
-                ("[bearing]\n", f'[bearing]\nelement = "{name}"\n'),
+                ("[bearing]\n", f'[bearing]\nelement = "{name}"\n{keys}'),
                 (_GIVEN, contact),
                 ('law = "none"', 'law = "tangent"\nratio = "0.25e-5 s"'),
             ),
             docs=("theory/rollers.md", f"`{name}`"),
+            variant=variant,
         )
-        for name, contact in ELEMENT_CONTACTS.items()
+        for name, contact, variant, keys in (
+            *((name, contact, "", "") for name, contact in ELEMENT_CONTACTS.items()),
+            ("ball", ELEMENT_CONTACTS["ball"], "at a contact angle", 'contact_angle = "15 deg"\n'),
+            ("ball", ELEMENT_CONTACTS["ball"], "displaced axially", 'axial_displacement = "20 um"\n'),
+        )
     ]
 
 

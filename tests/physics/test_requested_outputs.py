@@ -60,13 +60,13 @@ def press(*changes: tuple[str, str]) -> str:
     return text
 
 
-def two_way(*changes: tuple[str, str]) -> Scene:
-    return with_bearings(
-        press(*changes),
+def two_way(*changes: tuple[str, str], angle: str = "") -> Scene:
+    bearings = (
         bearing("A", elastic=True, law=GATED, count=2),
         bearing("B", inner="crank", law=ONE_SIDED),
         bearing("C", inner="slider", elastic=True),
     )
+    return with_bearings(press(*changes), *(text.replace("ball_angle", f"{angle}\nball_angle") for text in bearings))
 
 
 @cache
@@ -75,6 +75,7 @@ def machine(which: str) -> Derived:
     scene = {
         "one-way": lambda: scene_from_text(press(DAMPED_RING), "press"),
         "two-way": two_way,
+        "angled": lambda: two_way(angle='contact_angle = "20 deg"'),
         "torque": lambda: two_way(("[mechanism.driver]\n", TORQUE)),
     }[which]()
     return Derived(scene, further=(*MOTION, *POWER))
@@ -135,7 +136,7 @@ def test_acceleration_of_the_slider_is_that_of_the_textbook() -> None:
         assert found["body.rod.speed"] ** 2 + 0.0 == pytest.approx((w * l1 * s / root) ** 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("which", ["one-way", "two-way", "torque"])
+@pytest.mark.parametrize("which", ["one-way", "two-way", "angled", "torque"])
 def test_the_balance_of_every_joule_closes(which: str) -> None:
     """The kinetic energy changes by the sum of all named powers, with everything on that takes or gives work."""
     model = machine(which)
@@ -145,7 +146,7 @@ def test_the_balance_of_every_joule_closes(which: str) -> None:
         apart = {n: v for n, v in powers.items() if which == "one-way" and n.startswith(("contact", "load", "housing"))}
         linkage = [v for n, v in powers.items() if n not in apart]
         assert all(v != 0.0 for v in powers.values())
-        assert len(linkage) == {"one-way": 5, "two-way": 10, "torque": 10}[which]
+        assert len(linkage) == {"one-way": 5, "two-way": 10, "angled": 10, "torque": 10}[which]
         assert rates["kinetic_energy"] == pytest.approx(sum(linkage), abs=1e-9 * sum(map(abs, linkage)))
         if apart:
             rings = sum(apart.values()) - values["inner.loss"]
@@ -172,9 +173,10 @@ def test_the_balance_of_every_joule_closes(which: str) -> None:
         assert min(losses) >= 0.0
 
 
-def test_contacts_take_what_they_store_and_what_dampers_take() -> None:
+@pytest.mark.parametrize("which", ["two-way", "angled"])
+def test_contacts_take_what_they_store_and_what_dampers_take(which: str) -> None:
     """Two-way: elastic forces times rates of deflection, plus the loss, are what the balls take from the machine."""
-    model = machine("two-way")
+    model = machine(which)
     gates, h = model.gates(1.0), 2e-6
     t, x = states(model)[0]
     rate, values = model.rhs(t, x, gates), model.outputs(t, x, gates)

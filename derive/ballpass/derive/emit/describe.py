@@ -7,7 +7,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import catalogue_info, duty_info, info_of, lubrication_info, signature, versions
+from ballpass.derive.emit.signature import (
+    alignment_info,
+    catalogue_info,
+    duty_info,
+    info_of,
+    lubrication_info,
+    signature,
+    versions,
+)
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.plausible_ranges import usual_ranges
@@ -121,6 +129,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             ),
             catalogue=catalogue_info(bearing),
             lubrication=lubrication_info(bearing),
+            alignment=alignment_info(bearing),
             element=bearing.element,
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballpass.derive.emit.signature import (
+    alignment_info,
     catalogue_info,
     duty_info,
     folder_of,
@@ -181,7 +182,12 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
         run=info_of(mf.RunInfo, scene.run),
         duty=duty_info(scene),
         bearings=tuple(
-            replace(info, catalogue=catalogue_info(bearing), lubrication=lubrication_info(bearing))
+            replace(
+                info,
+                catalogue=catalogue_info(bearing),
+                lubrication=lubrication_info(bearing),
+                alignment=alignment_info(bearing),
+            )
             for info, bearing in zip(present.bearings, scene.bearings, strict=True)
         ),
     )

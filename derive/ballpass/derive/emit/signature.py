@@ -107,6 +107,11 @@ def lubrication_info(bearing: Bearing) -> mf.LubricationInfo | None:
     return None if bearing.lubrication is None else info_of(mf.LubricationInfo, bearing.lubrication)
 
 
+def alignment_info(bearing: Bearing) -> mf.AlignmentInfo | None:
+    """Misalignment and shaft of a bearing."""
+    return None if bearing.alignment is None else info_of(mf.AlignmentInfo, bearing.alignment)
+
+
 def duty_info(scene: Scene) -> tuple[mf.DutyInfo, ...]:
     """The states of a scene's duty cycle."""
     return tuple(info_of(mf.DutyInfo, state) for state in scene.duty)

@@ -13,7 +13,7 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_cage import read_cage
 from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body
 from ballpass.derive.reading.read_designation import fill_by_designation
-from ballpass.derive.reading.read_duty import read_lubrication
+from ballpass.derive.reading.read_duty import read_alignment, read_lubrication
 from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.bearing_records import (
     BallEffect,
@@ -104,6 +104,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             catalogue=catalogue,
             cage=read_cage(table, uneven),
             lubrication=read_lubrication(table),
+            alignment=read_alignment(table),
         )
 
 

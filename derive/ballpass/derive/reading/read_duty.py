@@ -1,4 +1,4 @@
-"""The tables [duty.<state>] and [bearing.lubrication] of a scene file: inputs of the rating life beside the model.
+"""The tables [duty.<state>], [bearing.lubrication] and [bearing.alignment]: inputs of the rating life beside the model.
 
 In: the tables.  Out: records, possibly with placeholders where faults were noted.
 """
@@ -11,12 +11,13 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
-from ballpass.derive.scene.bearing_records import Lubrication
+from ballpass.derive.scene.bearing_records import DIRT, Alignment, Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.read_keys import read_record
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import DutyState, Scene
-from ballpass.derive.scene.table import Table
+from ballpass.derive.scene.table import Table, listing
 from ballpass.derive.scene.units import show
+from ballpass.runtime.ratings.lubrication import FILTERS
 
 #: Shares of all states add up to one within this [1].
 SHARES = 1e-6
@@ -86,9 +87,36 @@ def _leaves(data: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
             yield f"{prefix}{key}", value
 
 
+def read_alignment(table: Table) -> Alignment | None:
+    """Misalignment and shaft of a bearing; None where the scene says nothing of them."""
+    if not table.has("alignment"):
+        return None
+    with table.table("alignment", "misalignment, or span and shaft_diameter") as said:
+        found = read_record(Alignment, said)
+        for key, other in (("span", "shaft_diameter"), ("shaft_diameter", "span")):
+            if said.has(key) and not said.has(other):
+                said.take(other, keys_of(Alignment)[other].sample)
+        return found
+
+
 def read_lubrication(table: Table) -> Lubrication | None:
     """Lubricant film and contamination of a bearing; None where the scene does not give them."""
     if not table.has("lubrication"):
         return None
     with table.table("lubrication") as film:
-        return read_record(Lubrication, film)
+        DIRT.choose(film, keys_of(Lubrication))
+        found = read_record(Lubrication, film)
+        if found.oil_code is None:
+            remedy = "delete the key, or give oil_code instead of the contamination"
+            film.refuse(
+                ("filter",), "a filter belongs to the code of an oil", allowed="filter with oil_code", remedy=remedy
+            )
+        elif found.oil_code not in FILTERS[found.filter or "off line"]:
+            film.fault(
+                "oil_code",
+                "ISO 281 has no contamination factor for this code with a filter in line",
+                given=show(found.oil_code),
+                allowed=listing([*FILTERS["in line"]]),
+                remedy='write filter = "off line", or name a cleaner oil',
+            )
+        return found

@@ -124,6 +124,7 @@ def _bearing() -> Iterator[Section]:
     )
     yield _of("bearing.fit", Fit)
     yield _of("bearing.lubrication", bearing_records.Lubrication)
+    yield _of("bearing.alignment", bearing_records.Alignment)
     for element in ELEMENTS.values():
         yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)
         yield _of("bearing.contact", element.given)

@@ -10,6 +10,8 @@ from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, TextKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, declared, not_negative, positive, quantity
+from ballpass.runtime.ratings.life import CONTAMINATION
+from ballpass.runtime.ratings.lubrication import FILTERS, GRADES
 
 FEWEST_BALLS, MOST_BALLS = 3, 200
 _BY_DESIGNATION = "required without a designation"
@@ -246,11 +248,14 @@ class Catalogue:
 class Lubrication:
     """Lubricant film and contamination, for the life factor of ISO 281; the derived equations do not depend on it.
 
-    Of `viscosity_ratio` [1] and kinematic `viscosity` at the bearing's temperature [m^2/s] one is given;
-    `contamination` is e_C [1].
+    Of `viscosity_ratio` [1], kinematic `viscosity` at the bearing's temperature [m^2/s], and grade of the oil with
+    temperature [°C] one is given, and of `contamination`, e_C [1], a class of `cleanliness`, and the code of the oil
+    one, see `DIRT`.
     """
 
-    either: ClassVar[Either] = Either(what="the film", groups=(("viscosity_ratio",), ("viscosity",)))
+    either: ClassVar[Either] = Either(
+        what="the film", groups=(("viscosity_ratio",), ("viscosity",), ("oil_grade", "temperature_celsius"))
+    )
 
     viscosity_ratio: float | None = quantity(
         "1",
@@ -268,15 +273,88 @@ class Lubrication:
         remedy="give that of the oil at the bearing's temperature",
         note="κ follows at each speed",
     )
-    contamination: float = quantity(
+    oil_grade: str | None = declared(
+        ChoiceKey(words="Viscosity grade of the oil, ISO 3448", choices=GRADES, note="mineral oil, viscosity index 95")
+    )
+    temperature_celsius: float | None = quantity(
+        "1",
+        "Temperature of the bearing in degrees Celsius",
+        example=70,
+        setting=True,
+        bounds=Bounds(least=-20.0, most=150.0),
+        remedy="give the temperature in degrees Celsius, as a plain number",
+        note="a plain number: scenes have no units with an offset",
+    )
+    contamination: float | None = quantity(
         "1",
         "Contamination factor $e_C$ of ISO 281",
         example=0.5,
         setting=True,
+        optional=True,
+        when="this, `cleanliness` or `oil_code`",
         bounds=Bounds(least=0.0, most=1.0),
         remedy="write contamination = 0.5 where cleanliness is normal",
         note="1 is clean; classes in {doc}`../theory/life`",
     )
+    cleanliness: str | None = declared(
+        ChoiceKey(
+            words="Class of cleanliness of ISO 281",
+            choices=tuple(CONTAMINATION),
+            optional=True,
+            when="instead of `contamination`",
+            note="$e_C$ is the lower end of its range",
+        )
+    )
+    oil_code: str | None = declared(
+        ChoiceKey(
+            words="Cleanliness code of a circulating oil or a bath, ISO 4406",
+            choices=tuple(FILTERS["off line"]),
+            optional=True,
+            when="instead of `contamination`",
+            note="$e_C$ follows with `filter`, κ and pitch diameter",
+        )
+    )
+    filter: str | None = declared(
+        ChoiceKey(
+            words="Where the oil is filtered",
+            choices=tuple(FILTERS),
+            optional=True,
+            when='with `oil_code`; default `"off line"`, also for a bath',
+        )
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alignment:
+    """Tilt of the rings by misalignment [rad] and bending of the shaft [m], for a hand formula beside the life."""
+
+    misalignment: float | None = not_negative(
+        "rad",
+        "Angle between the axes of shaft and housing at the bearing",
+        example="2 arcmin",
+        setting=True,
+        optional=True,
+    )
+    span: float | None = positive(
+        "m",
+        "Distance of the two bearings of the shaft, its load in the middle",
+        example="200 mm",
+        setting=True,
+        optional=True,
+        when="with `shaft_diameter`",
+    )
+    shaft_diameter: float | None = positive(
+        "m",
+        "Diameter of the shaft, round and of steel",
+        example="20 mm",
+        setting=True,
+        optional=True,
+        when="with `span`",
+    )
+
+
+#: How dirty the lubricant is: one of these.
+DIRT = Either(what="the contamination", groups=(("contamination",), ("cleanliness",), ("oil_code",)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -290,8 +368,8 @@ class Bearing:
     stand side by side (None: one).
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
-    nothing of that kind.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication` and `alignment` are None where the
+    scene says nothing of that kind.
     """
 
     name: str
@@ -385,6 +463,7 @@ class Bearing:
     catalogue: Catalogue | None = None
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None
+    alignment: Alignment | None = None
 
     @property
     def prefix(self) -> str:

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ballpass.runtime.ratings.life import hours
+from ballpass.runtime.ratings.oscillation import Oscillation
+from ballpass.runtime.ratings.tilt import Tilt
 from ballpass.runtime.show.short import ShortRepr
 
 
@@ -68,6 +70,8 @@ class BearingStrength(ShortRepr):
     viscosity_ratio, contamination : κ and e_C [1], None where the scene does not give them
     factor, modified_life : a_ISO [1] and L_nmr [turns] of the governing reading, likewise
     beyond : limits of these numbers that it is beyond, sentences
+    oscillation : where the rings swing, by hand; None where they turn, or do not move
+    tilt : of the rings, by hand
 
     Examples
     --------
@@ -100,6 +104,8 @@ class BearingStrength(ShortRepr):
     factor: float | None
     modified_life: float | None
     beyond: tuple[str, ...] = ()
+    oscillation: Oscillation | None = None
+    tilt: Tilt | None = None
 
     @property
     def governing(self) -> str:

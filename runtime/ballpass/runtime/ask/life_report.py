@@ -22,16 +22,20 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.ratings import life
+from ballpass.runtime.ratings.lubrication import contamination_of_class, contamination_of_code, viscosity
 from ballpass.runtime.ratings.of_bearing import (
     RacewayContact,
     Ratings,
     contacts_of,
     geometry_is_assumed,
     geometry_of,
+    radial_gap,
     ratings_of,
     why_no_life,
 )
+from ballpass.runtime.ratings.oscillation import Oscillation, oscillation
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, equivalent_loads, lives
+from ballpass.runtime.ratings.tilt import Tilt, free_tilt, shaft_slope
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.load_history import LoadHistory, load_history
@@ -126,7 +130,58 @@ def _bearing(
         factor=factor,
         modified_life=modified,
     )
-    return replace(strength, beyond=tuple(limits_of(info, values, strength)))
+    tilt = _tilt(info, values, load)
+    return replace(
+        strength,
+        beyond=(*limits_of(info, values, strength), *filter(None, (tilt.beyond,))),
+        oscillation=_oscillation(info, values, ratings, samples, load, force) if why and initial else None,
+        tilt=tilt,
+    )
+
+
+def _oscillation(
+    info: BearingInfo,
+    values: Mapping[str, float],
+    ratings: Ratings,
+    samples: LoadSamples,
+    load: float,
+    force: float,
+) -> Oscillation | None:
+    """What a hand formula says of rings that swing; None where they do not."""
+    amplitude = 0.5 * float(np.ptp(np.unwrap(samples.in_outer) - np.unwrap(samples.in_inner)))
+    if not amplitude > 0.0:
+        return None
+    geometry = geometry_of(info, values)
+    lengths = [float(contact.semi_axes(force)[1]) for contact in contacts_of(info, values)]
+    inner, outer = (
+        (length, abs(float(geometry.raceway_radius(sign)))) for length, sign in zip(lengths, (1.0, -1.0), strict=True)
+    )
+    return oscillation(
+        amplitude,
+        load,
+        dynamic_rating=float(ratings.dynamic),
+        exponent=float(ratings.life.basic),
+        balls=info.balls,
+        gamma=float(geometry.gamma),
+        contacts=(inner, outer),
+    )
+
+
+def _tilt(info: BearingInfo, values: Mapping[str, float], load: float) -> Tilt:
+    """Tilt of the rings by what the scene says of shaft and housing, and what the clearance leaves free."""
+    said, geometry = info.alignment, geometry_of(info, values)
+    free, keys = None, ("inner_groove_radius", "outer_groove_radius")
+    if all(key in geometry.contact for key in keys):
+        inner, outer = (float(geometry.contact[key]) for key in keys)
+        free = free_tilt(
+            float(geometry.diameter), float(geometry.pitch), (inner, outer), 2.0 * radial_gap(info, values)
+        )
+    if said is None:
+        return Tilt(misalignment=None, bending=None, free=free)
+    bending = None
+    if said.span is not None and said.shaft_diameter is not None:
+        bending = shaft_slope(load, said.span, said.shaft_diameter)
+    return Tilt(misalignment=said.misalignment, bending=bending, free=free)
 
 
 def static_safety(balls: int, static_rating: float, force: float) -> float:
@@ -185,15 +240,24 @@ def _modified(
     film = info.lubrication
     if film is None or not found:
         return None, None, None, None
-    ratio = film.viscosity_ratio
-    if ratio is None:
-        assert film.viscosity is not None  # the scene gives one of them
-        ratio = life.viscosity_ratio(film.viscosity, speed, values[f"{info.path}.pitch_diameter"])
+    ratio, pitch = film.viscosity_ratio, values[f"{info.path}.pitch_diameter"]
+    if ratio is None:  # the scene gives one of three
+        thick = film.viscosity
+        if film.oil_grade is not None and film.temperature_celsius is not None:
+            thick = viscosity(film.oil_grade, film.temperature_celsius)
+        assert thick is not None
+        ratio = life.viscosity_ratio(thick, speed, pitch)
+    contamination = film.contamination
+    if film.cleanliness is not None:
+        contamination = contamination_of_class(film.cleanliness, pitch)
+    elif film.oil_code is not None:
+        contamination = contamination_of_code(film.oil_code, film.filter or "off line", ratio, pitch)
+    assert contamination is not None
     shortest = min(found.values())
     load = life.equivalent_load(ratings.dynamic, shortest, ratings.life)
-    limit = film.contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
+    limit = contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
     factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit, ratings.life.factor))
-    return ratio, film.contamination, factor, float(life.modified_life(shortest, factor))
+    return ratio, contamination, factor, float(life.modified_life(shortest, factor))
 
 
 def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:

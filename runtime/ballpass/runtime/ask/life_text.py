@@ -175,14 +175,18 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
         ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
     ]
+    if bearing.tilt is not None:
+        parts.append(f"  {bearing.tilt.words}")
     if bearing.why_no_life:
-        return [*parts, f"  No rating life. {bearing.why_no_life}"]
+        parts.append(f"  No rating life. {bearing.why_no_life}")
+        return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
     lives = {
         f"basic L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
         **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},
     }
     if bearing.factor is not None:
-        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, viscosity ratio {bearing.viscosity_ratio:.3g}"
+        film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
+        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, {film}"
         lives[words] = bearing.modified_life
     known = {name: life for name, life in lives.items() if life is not None}
     return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]

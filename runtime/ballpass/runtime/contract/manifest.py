@@ -223,7 +223,21 @@ class LubricationInfo:
 
     viscosity_ratio: float | None
     viscosity: float | None
-    contamination: float
+    contamination: float | None
+    oil_grade: str | None = None
+    temperature_celsius: float | None = None
+    cleanliness: str | None = None
+    oil_code: str | None = None
+    filter: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentInfo:
+    """Tilt of a bearing's rings: see `ballpass.derive.scene.bearing_records.Alignment`; in rad and m."""
+
+    misalignment: float | None
+    span: float | None
+    shaft_diameter: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -257,6 +271,7 @@ class BearingInfo:
     catalogue: CatalogueInfo | None = None
     lubrication: LubricationInfo | None = None
     element: str = "ball"
+    alignment: AlignmentInfo | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
