@@ -58,7 +58,7 @@ def cage_ratio(names: Names) -> sp.Symbol:
 
 
 def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False) -> Cage:
-    """A ring at constant speed [rad/s], the inner one or the `outer`; the other stands, Eq. (7).  A slipping cage lags."""
+    """A ring at constant speed [rad/s], the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
     turning, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
