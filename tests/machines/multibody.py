@@ -79,7 +79,7 @@ class Multibody(Absolute):
         return kept * inner / (inner + outer), 1.0 - kept * inner / (inner + outer)
 
     def taken(self, bearing: Bearing, ball: int, q: Array) -> tuple[float, float]:
-        """What effects take from the deflection of a ball, and the slope over the inner ring's angle against the outer."""
+        """What effects take from a ball's deflection, and its slope over the inner ring's angle against the outer."""
         angle, (inner, outer) = self.ball_angle(bearing, q), self.turned(bearing, q)
         share, step = self.weights(bearing)[0], 1e-200j
         angle += TURN * (ball - 1) / bearing.balls

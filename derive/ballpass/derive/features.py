@@ -250,7 +250,7 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
     return replace(
         scene,
         mechanism=None,
-        shaft=Shaft(speed=mechanism.driver.speed),
+        shaft=Shaft(speed=mechanism.driver.speed, ring="inner"),
         bearings=tuple(bearings),
     )
 

@@ -173,11 +173,12 @@ def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
     """Bearings on a shaft, under the scene's own load."""
     own = own_loads(scene)
     speed = sp.S.Zero if scene.shaft is None else symbol_of(scene.shaft.speed)
+    outer = scene.shaft is not None and scene.shaft.ring == "outer"
     rings = []
     for bearing in scene.bearings:
         share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
         load = (share * own.force[0], share * own.force[1])
-        rings.append(_rings(bearing, cage_on_shaft(bearing, speed), load, inner_mass(bearing, None)))
+        rings.append(_rings(bearing, cage_on_shaft(bearing, speed, outer=outer), load, inner_mass(bearing, None)))
     return _of_rings(scene, rings, errors, inputs=own.inputs, definitions=own.definitions, constants=own.constants)
 
 

@@ -58,16 +58,18 @@ def cage_ratio(names: Names) -> sp.Symbol:
     return names.constant("cage_ratio")
 
 
-def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
-    """Inner ring at constant speed [rad/s], outer ring at rest, Eq. (7); a cage that slips lags behind."""
+def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False) -> Cage:
+    """A ring at constant speed [rad/s], the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
+    turning, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
-    pass_speed, passing = names.constant("inner_pass_speed"), _phase(bearing, names, "inner")
-    rolling = cage_ratio(names) * shaft_speed
+    pass_speed, passing = names.constant(f"{turning}_pass_speed"), _phase(bearing, names, turning)
+    rolling = share * shaft_speed
     constants: tuple[Definition, ...] = (
         _ratio(bearing, names),
         names.define(speed, kept_share(bearing) * rolling, "rad/s", "Speed of the cage", r"\omega_c"),
-        _pass(names, "inner", speed - shaft_speed),
+        _pass(names, turning, speed - shaft_speed),
+        *((_pass(names, "inner", speed),) if outer else ()),
     )
     lag = lag_of(bearing, names, rolling)
     behind, ledger, rate = sp.S.Zero, Ledger(), speed
@@ -76,25 +78,26 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
         words = "speed of the balls about the bearing's axis"
         rate = ledger.define(f"{bearing.prefix}cage.rate", speed - lag.rate, "rad/s", words, names.latex(r"\dot\psi"))
     angle = even.symbol + speed * TIME - behind
-    in_inner = passing.symbol + pass_speed * TIME - behind
-    turning = _spin(bearing, names, speed, -_rolls(bearing) * behind) if _spins(bearing) else None
-    passes = Passing(outer=(angle, speed), inner=(in_inner, pass_speed), even=True)
+    over_turning = passing.symbol + pass_speed * TIME - behind
+    still, moving = (angle, speed), (over_turning, pass_speed)
+    passes = Passing(outer=moving, inner=still, even=True) if outer else Passing(outer=still, inner=moving, even=True)
+    spin = _spin(bearing, names, passes.outer[1], -_rolls(bearing) * behind) if _spins(bearing) else None
     met = _met(bearing, names, passes)
     return Cage(
         angle=angle,
         rate=rate,
-        in_outer=angle,
-        in_inner=in_inner,
+        in_outer=passes.outer[0],
+        in_inner=passes.inner[0],
         inputs=(
             even,
             passing,
-            *(() if turning is None else turning.inputs),
+            *(() if spin is None else spin.inputs),
             *(() if lag is None else lag.inputs),
             *met.inputs,
         ),
-        constants=(*constants, *(() if turning is None else turning.constants), *met.constants),
+        constants=(*constants, *(() if spin is None else spin.constants), *met.constants),
         definitions=ledger.definitions,
-        spin=None if turning is None else turning.angle,
+        spin=None if spin is None else spin.angle,
         share=cage_ratio(names),
     )
 

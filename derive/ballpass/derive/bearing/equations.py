@@ -43,8 +43,8 @@ class BallRelations:
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
     definitions : they use `cos` and `sin`
-    sums : symbol := sum of the expression over j, the forces along x and y; where bodies move with the rings, the torque
-        on the inner one by what effects take from the deflections as well
+    sums : symbol := sum of the expression over j, the forces along x and y; where bodies move with the rings, the
+        torque on the inner one by what effects take from the deflections as well
     switching : where the force of a ball has kinks
     """
 

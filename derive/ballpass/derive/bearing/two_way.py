@@ -67,7 +67,7 @@ def play_of(bearing: Bearing, joint: Joint, coordinates: tuple[Coordinate, ...])
 def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage: Linkage) -> Coupled:
     """Forces of the balls on both bodies, and the outer ring where it moves on its own."""
     assert bearing.joint is not None
-    joint, ball, names = mechanism.joint(bearing.joint), model.ball, model.names
+    joint, ball = mechanism.joint(bearing.joint), model.ball
     count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
     bodies = (bearing.inner_body, joint.other(bearing.inner_body))
     inner = ring(model.coordinates, 0)

@@ -23,7 +23,9 @@ class AngleState(Drive):
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
         """1 where the switching function of a window is positive."""
         latex = rf"g_{{\mathrm{{{name}}}}}"
-        return window_gate(name, f"1 while {name} acts, else 0", latex, angle=(DRIVER_ANGLE, self.speed), windows=windows)
+        return window_gate(
+            name, f"1 while {name} acts, else 0", latex, angle=(DRIVER_ANGLE, self.speed), windows=windows
+        )
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
         """Value over the angle after the first knot, without whole periods."""

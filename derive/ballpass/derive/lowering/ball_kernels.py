@@ -354,8 +354,6 @@ class BallBuilder:
         return rows
 
 
-
-
 def _is_smooth_in(value: ca.SX, symbol: ca.SX) -> bool:
     """Whether a derivative is not zero everywhere."""
     return bool(ca.sparsify(ca.jacobian(value, symbol)).nnz())

@@ -34,7 +34,6 @@ from ballpass.derive.lowering.ball_kernels import (
     UnfitError,
 )
 from ballpass.derive.lowering.mass_matrix import accelerations
-from ballpass.derive.lowering.ring_motion_slopes import RELATIVE
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -166,9 +165,14 @@ class KernelBuilder:
         balance = found.residual
         relative = ca.vertcat(rings, *(self._of_state(symbol) for symbol in shared))
         g = ca.SX.sym("G", sum(b.slopes for b in self._balls))
-        parts = [_parts(v, sizes) for v, sizes in (
-            (sums, counts), (g, [b.slopes for b in self._balls]), (held, [b.relative.numel() for b in self._balls])
-        )]
+        parts = [
+            _parts(v, sizes)
+            for v, sizes in (
+                (sums, counts),
+                (g, [b.slopes for b in self._balls]),
+                (held, [b.relative.numel() for b in self._balls]),
+            )
+        ]
         by_rings = ca.diagcat(*(b.by_relative(*of) for b, *of in zip(self._balls, *parts, strict=True)))
         by_sums = ca.jacobian(balance, sums)
         by_relative = ca.jacobian(balance, held) + by_sums @ ca.horzcat(by_rings, ca.SX(by_rings.size1(), len(shared)))

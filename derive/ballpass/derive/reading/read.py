@@ -27,7 +27,7 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
-from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, RunSettings, Scene, quantities_of
+from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, RunSettings, Scene, UnbalanceLoad, quantities_of
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
@@ -216,6 +216,8 @@ def _read(root: Table, name: str) -> Scene:
         else:
             shaft = read_shaft(root.table("shaft", "speed"))
         loads = _read_loads(root, required=shaft is not None) if has_bearing else ()
+        if shaft is not None and shaft.ring == "outer":
+            _refuse_unbalance(root, loads)
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
@@ -337,6 +339,18 @@ def _read_loads(root: Table, *, required: bool) -> tuple[Load, ...]:
         for load in loads
         if load is not None
     )
+
+
+def _refuse_unbalance(root: Table, loads: Sequence[Load]) -> None:
+    """An unbalance turns with the inner ring, on which it acts."""
+    for load in (load for load in loads if isinstance(load.law, UnbalanceLoad)):
+        root.collector.fault(
+            (*load.path.split("."), "type"),
+            "the unbalance turns with the shaft and acts on the inner ring, which stands",
+            given=f'type = "unbalance" in [{load.path}], and ring = "outer" in [shaft]',
+            allowed="loads that do not turn with the shaft, where the outer ring turns",
+            remedy='write ring = "inner", or a harmonic load with the frequency of the shaft',
+        )
 
 
 def _check_loads_beside(root: Table, loads: Sequence[Load], bearings: Sequence[Bearing]) -> None:

@@ -6,6 +6,7 @@ coupling stand beside the other.
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, InnerRing
@@ -57,7 +58,16 @@ def read_count(table: Table, coupling: str) -> SceneNumber | None:
             allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
             remedy="write share = 0.5 for one of two bearings",
         )
-    return keys_of(Bearing)["count"].read(table, "count")  # type: ignore[no-any-return]
+    count: SceneNumber | None = keys_of(Bearing)["count"].read(table, "count")
+    if count is not None and math.isfinite(count.value) and not count.value.is_integer():
+        table.fault(
+            "count",
+            "this is no number of bearings",
+            given=show(table.data.get("count")),
+            allowed="a whole number from 1",
+            remedy="write count = 2 for a pair; bearings that differ are at joints of their own",
+        )
+    return count
 
 
 def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:

@@ -150,8 +150,8 @@ class CageMotion:
         when="default: none",
         bounds=Bounds(above=-1.0, below=1.0),
         usual=UsualRange(least=0.0, most=0.3, hint=_PERCENTS),
-        note="seen from the ring that stands, or the outer one where both turn. Or a table over time, from 0 s on, each "
-        'value constant until the next row: `{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`; not with '
+        note="seen from the ring that stands, or the outer one where both turn. Or a table over time, from 0 s on, "
+        'each value constant until the next row: `{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`; not with '
         '`coupling = "two-way"` or `driver.table`',
     )
     time: tuple[SceneNumber, ...] = ()

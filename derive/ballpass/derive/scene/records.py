@@ -246,10 +246,22 @@ class Mechanism:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """Rotation of the inner ring where no mechanism gives it: constant speed [rad/s]."""
+    """Rotation of a ring where no mechanism gives it: constant speed [rad/s].  The other ring stands."""
 
     speed: SceneNumber = quantity(
-        "rad/s", "Speed of the shaft", r"\omega", "1200 rpm", note="of the inner ring, whose angle is zero at t = 0"
+        "rad/s",
+        "Speed of the shaft",
+        r"\omega",
+        "1200 rpm",
+        note="of the ring that turns, whose angle is zero at t = 0",
+    )
+    ring: Literal["inner", "outer"] = declared(
+        ChoiceKey(
+            words="The ring that turns with the shaft",
+            choices=("inner", "outer"),
+            default="inner",
+            note="loads act on the inner ring, also where it stands",
+        )
     )
 
 

@@ -69,14 +69,14 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
     values : parameters and derived constants by name
     """
     at = bearing.path
-    outer = values.get(f"{at}.outer_pass_speed", values[f"{at}.cage_speed"])
-    cage, inner = abs(outer) / driver_angle.TURN, abs(values[f"{at}.inner_pass_speed"]) / driver_angle.TURN
+    speeds = (values[f"{at}.cage_speed"], values.get(f"{at}.outer_pass_speed"), values[f"{at}.inner_pass_speed"])
+    cage, outer, inner = (abs(speeds[0] if v is None else v) / driver_angle.TURN for v in speeds)
     return KinematicFrequencies(
         shaft=abs(values[bearing.ring_speed]) / driver_angle.TURN,
         cage=cage,
-        ball_pass_outer=bearing.balls * cage,
+        ball_pass_outer=bearing.balls * outer,
         ball_pass_inner=bearing.balls * inner,
-        ball_spin=cage
+        ball_spin=outer
         * (contact_cosine(bearing, values) + values[f"{at}.pitch_diameter"] / values[f"{at}.ball_diameter"]),
     )
 

@@ -154,9 +154,9 @@ class QuantityRun:
             if kind_of(item).extremes and jumps(self.model, item.channel):
                 raise RequestError(
                     f"{item.name}: {item.channel} jumps where a load within a window begins or ends, or a ball enters "
-                    "or leaves a spall, at a time that the motion decides; on which side of the jump the extreme is, is "
-                    "not followed. Allowed: extremes of states and all else that does not jump; means and integrals of "
-                    "all. Or give the load as a table over the angle, with flanks as steep as they are."
+                    "or leaves a spall, at a time that the motion decides; on which side of the jump the extreme is, "
+                    "is not followed. Allowed: extremes of states and all else that does not jump; means and integrals "
+                    "of all. Or give the load as a table over the angle, with flanks as steep as they are."
                 )
         chain = Chain(self.model, run.numbers, names)
         found, layouts = self._measure(run, self._moving, len(names))

@@ -1,0 +1,256 @@
+"""Claims about waviness, spalls and slip with every drive, in both couplings, on whichever ring turns.
+
+Accelerations against absolute coordinates are in `test_coupled_machines.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_effects import taken
+from comparison import drawn, power_imbalance
+from coupled_scenes import EFFECTS, POWERS, RUN, SPALLS, TANGENT, UNDAMPED, Derived, bearing, with_bearings
+from multibody import Multibody
+
+from ballpass.derive import SceneError, generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model, load
+from ballpass.runtime.ask.vibration import order_spectrum
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+MOTOR = """[mechanism.driver.torque]
+law = "asynchronous"
+breakdown_torque = "40 N*m"
+breakdown_slip = 0.2
+synchronous_speed = "520 rpm"
+[mechanism.driver.flywheel]
+inertia = "0.2 kg*m^2"
+"""
+COASTING = '[mechanism.driver.torque]\nlaw = "none"\n[mechanism.driver.flywheel]\ninertia = "0.2 kg*m^2"\n'
+SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-clockwise\n'
+RUN_UP = 'table = { time = ["0 s", "6 s"], speed = ["300 rpm", "900 rpm"] }\n'
+SPALL = """[bearing.defects.spall]
+on = "outer"
+angle = "283 deg"
+chord = "1 mm"
+profile = "path"
+"""
+
+
+@cache
+def press(*bearings: str, drive: str = "", table: bool = False) -> str:
+    """The paper's press with other bearings and another drive."""
+    text = (SCENES / "punching_press.toml").read_text(encoding="utf-8").partition("[bearing]")[0]
+    assert SPEED in text
+    text = text.replace(SPEED, RUN_UP) if table else text
+    return text.replace("[mechanism.frame.points]", f"{drive}[mechanism.frame.points]") + "".join(bearings) + RUN
+
+
+ALL = EFFECTS + SPALLS
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        press(bearing("A", elastic=True, count=2, effects=ALL)),
+        press(bearing("A", "frame", effects=ALL), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
+    ],
+    ids=["constant speed", "motor, outer ring on the crank"],
+)
+def test_powers_of_all_forces_are_the_change_of_the_kinetic_energy(text: str) -> None:
+    """Balls that roll over waves and edges turn the rings; without that torque the balance misses by percents."""
+    derived = Derived(with_bearings(text), further=POWERS)
+    machine, rng = Multibody(derived.scene, derived.points()), np.random.default_rng(3)
+    for _ in range(3):
+        assert power_imbalance(derived, machine, *drawn(rng, derived, machine)) < 1e-10
+
+
+def test_a_heavy_ring_in_a_light_linkage_feels_effects_as_one_coupled_one_way_does() -> None:
+    """The same state, with effects and without: what they change of the rings' accelerations."""
+    one_way = (SCENES / "punching_press.toml").read_text(encoding="utf-8").partition("[bearing]")
+    common = bearing("A", elastic=True, effects=ALL).replace("bearings.at_A", "bearing")
+    single = common.replace('coupling = "two-way"', "share = 1.0") + '[bearing.inner_ring]\nmass = "50 kg"\n'
+    states = np.random.default_rng(8).uniform(-1, 1, (4, 8)) * np.repeat([3e-5, 0.1], 4)
+    changed = []
+    for text in (common, single):
+        derived = [
+            Derived(scene_from_text(one_way[0] + own + RUN, "press"))
+            for own in (text, text.replace(EFFECTS.replace("[bearing.", "[bearing."), "").replace(SPALLS, ""))
+        ]
+        for one in derived:
+            light = {f"mechanism.bodies.{body}.mass": 1e-9 for body in ("rod", "slider")}
+            light |= {"mechanism.bodies.rod.inertia": 1e-12, "mechanism.bodies.crank.mass": 50.0}
+            one.change({name: value for name, value in light.items() if name in one.values})
+        rows = []
+        for t, x in zip((0.011, 0.03, 0.07, 0.15), states, strict=True):
+            rows.append([one.rhs(t, x, one.gates() | one.spall_gates(t))[4:] for one in derived])
+        changed.append(np.array([wavy - plain for wavy, plain in rows]))
+    assert np.max(np.abs(changed[1])) > 10.0
+    assert changed[0] == pytest.approx(changed[1], rel=1e-6, abs=1e-6 * np.max(np.abs(changed[1])))
+
+
+#: Bearings of the press: whether the angles of its balls are known before a run, and how it is driven.
+LINES = {
+    "constant speed": press(bearing("A", elastic=True, effects=SPALL)),
+    "run-up by a table": press(bearing("A", elastic=True, effects=SPALL), table=True),
+    "motor": press(bearing("A", elastic=True, effects=SPALL), drive=MOTOR),
+}
+
+
+def built(text: str, folder: Path) -> Model:
+    return load(generate(scene_from_text(text, "press"), folder))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("drive", LINES)
+def test_a_spall_of_the_outer_ring_is_met_at_the_ball_pass_order_of_the_momentary_speed(
+    drive: str, tmp_path: Path
+) -> None:
+    """Amplitudes over the angle that the crank has turned: the line lies at a multiple of Z r_b/(R_b + r_b)."""
+    model = built(LINES[drive], tmp_path / "model")
+    times = np.linspace(0.3, 4.0, 80001)
+    run = model.simulate(times=times, duration=4.0, transient=0, rtol=1e-7, outputs=["at_A.ring_force.y"])
+    speed = model.parameters["mechanism.driver.speed"]
+    angle = speed * times if drive == "constant speed" else run["driver.angle"]
+    rates = np.gradient(angle, times)
+    assert np.ptp(rates) / np.mean(rates) > {"constant speed": -1.0, "run-up by a table": 0.5, "motor": 0.05}[drive]
+    found = order_spectrum(angle, run["at_A.ring_force.y"])
+    multiple, order = 5, 8 * (1 - 7.9375 / 33.5) / 2
+    near = np.flatnonzero(np.abs(found.frequency / (multiple * order) - 1) < 0.012)  # no multiple of the shaft
+    k = near[np.argmax(found.amplitude[near])]
+    left, top, right = np.log(found.amplitude[k - 1 : k + 2])
+    line = found.frequency[k] + 0.5 * (left - right) / (left - 2 * top + right) * found.resolution
+    assert found.amplitude[k] > 10 * np.median(found.amplitude[near])
+    assert line / multiple == pytest.approx(order, rel=1e-3)
+
+
+COAST = press(bearing("A", law=UNDAMPED, effects=ALL), bearing("B", "rod", law=UNDAMPED, effects=SPALL), drive=COASTING)
+#: No jump gives or takes energy: edges without a step.
+SMOOTH_EDGES = COAST.replace('profile = "rectangular"', 'profile = "path"').replace("half-sine", "path")
+
+
+@pytest.mark.long
+def test_a_machine_that_coasts_keeps_its_energy_with_every_effect(tmp_path: Path) -> None:
+    """Weight, kinetic energy and contacts by the second implementation along a run, spalls in two joints."""
+    window = 'window = { start = "237 deg", end = "267 deg" }'
+    assert window in SMOOTH_EDGES
+    model = built(SMOOTH_EDGES, tmp_path / "model")
+    idle = {f"mechanism.forces.punch.force.{axis}": 0.0 for axis in "xy"}
+    times = np.linspace(0.0, 0.09, 7)
+    run = model.simulate(
+        duration=0.09, times=times, transient=0, parameters=idle, method="stepper-dop853", rtol=1e-11, kinks="located"
+    )
+    derived = Derived(with_bearings(SMOOTH_EDGES), idle)
+    machine = Multibody(derived.scene, derived.points(), idle)
+    energy = np.array([machine.energy(t, x) for t, x in zip(times, run.x, strict=True)])
+    total, exchanged = np.sum(energy, axis=1), np.ptp(energy[:, 0])
+    assert exchanged > 0.1
+    assert np.max(np.abs(total - total[0])) < 1e-7 * energy[0, 0]
+
+
+@pytest.mark.long
+def test_derivatives_lanes_and_the_exported_program_agree_where_the_motion_meets_the_spalls(tmp_path: Path) -> None:
+    text = press(
+        bearing("A", law=TANGENT, effects=EFFECTS), bearing("B", "rod", effects=EFFECTS + SPALL), drive=MOTOR
+    ).replace("[run]", '[run]\nmethod = "stepper-dop853"\nrtol = 1e-9')
+    model = built(text, tmp_path / "press")
+    names = [
+        "bearings.at_B.defects.spall.angle",
+        "bearings.at_B.defects.spall.chord",
+        "bearings.at_B.inner_waviness.9.amplitude",
+        "bearings.at_A.ball_waviness.each.4.amplitude",
+        "bearings.at_A.cage.slip",
+        "bearings.at_B.ball_angle",
+    ]
+    length = {"duration": 0.04, "transient": 0}
+    found = model.sensitivities(names, duration=0.04, method="stepper-dop853", rtol=1e-10).x[-1]
+    for name, column in zip(names, found.T, strict=True):
+        value, step = model.parameters[name], 1e-9 if name.endswith(("chord", "amplitude")) else 1e-5
+        ends = [
+            model.simulate(
+                parameters={name: value + s}, method="stepper-dop853", rtol=1e-12, kinks="located", **length
+            ).x[-1]
+            for s in (step, -step)
+        ]
+        slope = (ends[0] - ends[1]) / (2 * step)
+        assert np.max(np.abs(slope)) > 0.0
+        assert column == pytest.approx(slope, rel=1e-3, abs=3e-4 * np.max(np.abs(slope)))
+    depths = {"bearings.at_B.outer_waviness.7.amplitude": [1e-6, 3e-6]}
+    many = model.simulate_many(depths, ["max:at_B.inner.y"], rtol=1e-9, **length)
+    alone = model.reduce(rtol=1e-9, **length)["at_B.inner.y"].maximum
+    assert many["max:at_B.inner.y"][1] == pytest.approx(alone, rel=1e-9)
+
+
+@pytest.mark.long
+def test_lanes_take_effects_in_every_coupling(tmp_path: Path) -> None:
+    """Two-way at constant speed, kinks stepped over: members beside each other in lanes are those alone."""
+    model = built(press(bearing("A", effects=EFFECTS), bearing("B", "rod", effects=EFFECTS)), tmp_path / "model")
+    amplitudes = {"bearings.at_B.outer_waviness.7.amplitude": np.linspace(1e-6, 3e-6, 9)}
+    many = model.simulate_many(amplitudes, ["max:at_B.ball.force"], cycles=0.5, transient=0, rtol=1e-5)
+    assert many.statistics.lanes > 1
+    fine = [
+        model.reduce(cycles=0.5, transient=0, rtol=1e-9, parameters={next(iter(amplitudes)): value})
+        for value in amplitudes["bearings.at_B.outer_waviness.7.amplitude"][[0, -1]]
+    ]
+    expected = [one["at_B.ball.force"].maximum for one in fine]
+    assert many["max:at_B.ball.force"][[0, -1]] == pytest.approx(expected, rel=2e-3)
+    assert abs(expected[1] / expected[0] - 1) > 1e-2
+
+
+SHAFT = ("[shaft]\n", '[shaft]\nring = "outer"\n')
+#: Every ball pressed, rings held in the middle.
+HELD = (
+    ('clearance = "0 um"  ', 'clearance = "-200 um"  '),
+    ('["3.9937 um", "0.1 um"]', '["0 um", "0 um"]'),
+    ("[bearing.inner_ring]", f"{ALL}[bearing.inner_ring]"),
+)
+
+
+@pytest.mark.parametrize("outer", [False, True])
+def test_an_outer_ring_that_turns_carries_its_waves_and_spalls_with_it(
+    make_virtual: Callable[..., Model], outer: bool
+) -> None:
+    """Deflections while the rings are held, over the second implementation's angles; the lines follow from them."""
+    model = make_virtual("varying_compliance", *HELD, *((SHAFT,) if outer else ()))
+    values, (record,) = model.parameters, scene_bearings(outer)
+    ball, pitch, speed = (values[k] for k in ("bearing.ball_diameter", "bearing.pitch_diameter", "shaft.speed"))
+    kept, rolling = 1 - values["bearing.cage.slip"], (pitch - ball) / (2 * pitch)
+    cage = kept * (1 - rolling if outer else rolling) * speed
+    felt = []
+    for t in np.linspace(0.0, 1.3, 29):
+        rings = (speed * t, 0.0) if outer else (0.0, speed * t)
+        angles = cage * t + values["bearing.ball_angle"] + 2 * math.pi * np.arange(8) / 8
+        spin = (1 + pitch / ball) * (cage * t - rings[0])
+        expected = [
+            1e-4 - taken(record, lambda q: values[q.path], j + 1, a - rings[0], a - rings[1], spin).real
+            for j, a in enumerate(angles)
+        ]
+        found = model.evaluate(float(t), np.zeros(4), ["ball.deflection"])["ball.deflection"]
+        assert found == pytest.approx(np.array(expected), abs=1e-12)
+        felt.append(expected)
+    assert np.ptp(felt) > 5e-6
+
+
+@cache
+def scene_bearings(outer: bool) -> tuple:  # type: ignore[type-arg]
+    text = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+    for old, new in (*HELD, *((SHAFT,) if outer else ())):
+        assert old in text
+        text = text.replace(old, new)
+    return scene_from_text(text, "held").bearings
+
+
+def test_what_has_no_model_is_refused(scene_text: Callable[..., str]) -> None:
+    """A slip that changes beside uneven rings, half a bearing, an unbalance on a ring that stands."""
+    changing = '[bearing.cage]\nslip = { time = ["0 s", "1 s"], value = [0.0, 0.1] }\n[bearing.damping]'
+    with pytest.raises(SceneError, match=r"bearing.cage.slip.*changes over time"):
+        scene_from_text(scene_text("punching_press_two_way", ("[bearing.damping]", changing)), "press")
+    with pytest.raises(SceneError, match=r"bearing.count.*no number of bearings"):
+        scene_from_text(scene_text("punching_press_two_way", ("count = 2 ", "count = 1.5 ")), "press")
+    with pytest.raises(SceneError, match="acts on the inner ring, which stands"):
+        scene_from_text(scene_text("rotor", SHAFT), "rotor")
