@@ -15,6 +15,7 @@ from ballpass.derive import generate
 from ballpass.runtime import Model, SimulationError, load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.certify.error_target import TargetMissed
+from ballpass.runtime.certify.growth import DIGITS
 
 CLEARANCE = "bearing.clearance"
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -74,6 +75,28 @@ def test_an_ensemble_marks_the_members_that_single_runs_differ_in(press: Model) 
 
 
 @pytest.mark.long
+def test_members_that_one_moved_start_shares_by_luck_are_marked(press: Model) -> None:
+    """One moved start left out 13 of 40 members, whose numbers others change by far more than their digits."""
+    of, table = "min:inner.x", {CLEARANCE: np.linspace(24e-6, 60e-6, 20)}
+    length = {"cycles": 6, "transient": 2}
+    found = press.simulate_many(table, of, growth=True, **length)  # type: ignore[arg-type]
+    assert found.uncertain is not None
+    positions = [name for name in press.parameters if ".initial." in name and "velocity" not in name]
+    starts = [
+        press.simulate_many(
+            {**table, **{name: np.full(20, press.parameters[name] + 1e-12 * k) for name in positions}},
+            of,
+            rtol=1e-8,
+            **length,  # type: ignore[arg-type]
+        )[of]
+        for k in range(4)
+    ]
+    off = np.max(np.abs(np.array(starts) - found[of]), axis=0) > 20.0 * DIGITS * np.abs(found[of])
+    marked = found.uncertain[of]
+    assert np.count_nonzero(off) >= 2
+    assert np.flatnonzero(off & ~marked).tolist() == []
+
+
 def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 

@@ -44,6 +44,9 @@ TOLERATED = 100.0
 #: States that are apart by so much of their magnitudes at the end, from starts apart by a tolerance, have parted [1].
 PARTED = 1e-3
 
+#: Times that a number may be off by what four of its digits bear, where steps lose that over kinks: more is said [1].
+LOST = 10.0
+
 #: Looser runs are looked at by this tolerance: what their steps lose is their error, not a growth [1].
 LOOSEST = 1e-6
 
@@ -58,6 +61,9 @@ TINY = 1e-10
 
 #: Moved starts over which the numbers of an uncertain channel are spread.
 STARTS = 20
+
+#: The same of each member of an ensemble whose states part.
+MEMBER_STARTS = 8
 
 #: What is compared of each channel.
 KINDS = ("min", "max", "rms")
@@ -77,6 +83,7 @@ class Growth(ShortRepr):
     uncertain : channels whose digits the tolerance does not bear
     parted : how far the states are apart at the end of the run, in their magnitudes [1]
     steps : of the run
+    lost : of channels whose numbers steps over kinks put off by more than their digits: by how much [1]
     spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
     """
 
@@ -85,6 +92,7 @@ class Growth(ShortRepr):
     uncertain: tuple[str, ...]
     parted: float = 0.0
     steps: int = 0
+    lost: Mapping[str, float] = field(default_factory=dict)
     spread: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -95,6 +103,13 @@ class Growth(ShortRepr):
     @property
     def words(self) -> str:
         """A warning for people; empty where the digits stand."""
+        if self.lost and not self.uncertain:
+            worst = max(self.lost, key=lambda name: self.lost[name])
+            return (
+                f"steps over the kinks of the laws put {', '.join(self.lost)} off, {worst} by "
+                f"{100.0 * self.lost[worst]:.2g} %: small errors grow in this motion for a while. Take a tighter "
+                "tolerance (--rtol 1e-8), or end steps on kinks (--kinks located)."
+            )
         if not self.uncertain and self.parted > PARTED:
             return (
                 f"the motion amplifies small errors: from a start moved by {self.moved:g} of the motion the states are "
@@ -129,10 +144,14 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
     run = stepper_run(model, numbers, request)
     way = _way(run, request.kinks)
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
-    found = _compare(run, way, moved)
+    found, plain = _compare(run, way, moved)
     if (found.uncertain or found.parted > PARTED) and way.kinks != LOCATED:
         way = replace(way, kinks=LOCATED)
-        found = _compare(run, way, moved)
+        found, located = _compare(run, way, moved)
+        off = {name: _relative(plain[name], located[name]) for name in found.changes if name not in found.uncertain}
+        # of looser runs it is not known
+        lost = {name: part for name, part in off.items() if part > LOST * DIGITS and run.rtol <= LOOSEST}
+        found = replace(found, lost=lost)
     return _spread(run, way, found) if (found.uncertain or found.parted > PARTED) and spread else found
 
 
@@ -149,10 +168,10 @@ def by_moved_start(run: Run, moved: np.ndarray, most: int) -> Growth:
         The computation failed.
     """
     way = _way(run, None)
-    found = _compare(run, way, moved)
+    found, _ = _compare(run, way, moved)
     # what steps lose over kinks shrinks with the tolerance as well, and needs no other library
     again = found.uncertain and TIGHTER_COSTS * found.steps <= most
-    return _compare(run, replace(way, rtol=TIGHTER * way.rtol), moved) if again else found
+    return _compare(run, replace(way, rtol=TIGHTER * way.rtol), moved)[0] if again else found
 
 
 def _way(run: Run, kinks: str | None) -> MethodChoice:
@@ -179,7 +198,8 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
         )
 
 
-def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> Growth:
+def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> tuple[Growth, dict[str, np.ndarray]]:
+    """What a moved start changes, and the numbers of each channel from the start itself."""
     channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
     names = [f"{kind}:{name}" for name in channels for kind in KINDS]
     quantities = QuantityRun(run.model, quantities_of(run.model, names))
@@ -200,7 +220,14 @@ def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> Growth:
         if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
             uncertain.append(name)
     parted = float(np.max(np.abs(other_end - end) / run.magnitude))
-    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted, steps=steps)
+    found = Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted, steps=steps)
+    return found, dict(zip(channels, one, strict=True))
+
+
+def _relative(numbers: np.ndarray, others: np.ndarray) -> float:
+    """Largest difference over the largest number."""
+    largest = float(np.abs(others).max())
+    return float(np.abs(numbers - others).max()) / largest if largest > 0.0 else 0.0
 
 
 def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
@@ -242,36 +269,64 @@ def simulate_members(
     looked_at = {name: item for name, item in quantities.items() if not (item.kind in PLACES or _at_rest(item))}
     # a force that crosses zero has no digits of its size, but of its range
     ranges = {name: f"range:{item.channel}" for name, item in looked_at.items() if _has_range(model, item)}
-    names = list(dict.fromkeys((*asked, *ranges.values())))
+    ends = {f"end:{name}": name for name in model.states} if looked_at else {}
+    names = list(dict.fromkeys((*asked, *ranges.values(), *ends)))
     result = run(table, names)
     count = len(next(iter(result.parameters.values())))
     uncertain = {name: np.zeros(count, dtype=bool) for name in asked}
     rtol = min(result.statistics.rtol, LOOSEST)
     numbers = model.numbers(None)
     magnitude = resolve(model, numbers, Request()).magnitude
-    tolerated = dict(zip(model.states, TOLERATED * rtol * magnitude, strict=True))
+    size_of = dict(zip(model.states, magnitude.tolist(), strict=True))
     positions = dict(zip(manifest.initial[: len(magnitude) // 2], magnitude.tolist(), strict=False))
     left = np.setdiff1d(np.arange(count), [failure.member for failure in result.failures])
+    ways: dict[str, object] = {}
+
+    def starting(k: int) -> EnsembleResult:
+        """Members that are left, from starts moved by so many tolerances."""
+        rows = {name: values[left] for name, values in result.parameters.items()}
+        starts = {name: rows.get(name, np.full(len(left), numbers.parameters[name])) for name in positions}
+        return run({**rows, **{name: starts[name] + k * rtol * positions[name] for name in positions}}, names, **ways)
+
+    def bearable(name: str, one: np.ndarray, spans: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Change of a number that four of its digits bear."""
+        scale = np.abs(one)
+        if name not in ranges:
+            return np.asarray(DIGITS * scale)
+        scale = np.fmax(scale, spans[ranges[name]])
+        return np.asarray(np.fmax(DIGITS * scale, TOLERATED * rtol * size_of.get(looked_at[name].channel, 0.0)))
+
     for ways in ({}, {"rtol": rtol, "method": "stepper", "kinks": LOCATED}):
         if not (looked_at and len(left)) or result.interrupted:
             break
-        rows = {name: values[left] for name, values in result.parameters.items()}
-        starts = {name: rows.get(name, np.full(len(left), numbers.parameters[name])) for name in positions}
-        moved = {name: starts[name] + rtol * positions[name] for name in positions}
-        again = run(rows, names, **ways) if ways else result
-        other = run({**rows, **moved}, names, **ways) if not again.interrupted else again
+        again = starting(0) if ways else result
+        other = starting(1) if not again.interrupted else again
         result = replace(result, interrupted=other.interrupted)
         one = {name: again[name] if ways else result[name][left] for name in names}
-        for name, item in looked_at.items():
-            scale = np.abs(one[name])
-            if name in ranges:
-                scale = np.fmax(scale, one[ranges[name]])
+        for name in looked_at:
             # a run that fails from the moved start, or was interrupted, has no digits either
-            bears = np.abs(one[name] - other[name]) <= np.fmax(
-                DIGITS * scale, tolerated.get(item.channel, 0.0) if name in ranges else 0.0
-            )
-            uncertain[name][left] = ~bears
-        left = left[np.any([uncertain[name][left] for name in looked_at], axis=0)]
+            bears = bearable(name, one[name], one)
+            uncertain[name][left] = ~(np.abs(one[name] - other[name]) <= bears)
+            # or steps over kinks lost more than the digits of the number that is given
+            uncertain[name][left] |= np.abs(result[name][left] - one[name]) > LOST * bears
+        # two runs may share a number by luck, or have it before errors have grown
+        apart = [np.abs(one[end] - other[end]) > PARTED * size_of[name] for end, name in ends.items()]
+        left = left[np.any([uncertain[name][left] for name in looked_at] + apart, axis=0)]
+    if len(left) and looked_at and not result.interrupted:
+        every = []
+        for k in range(MEMBER_STARTS):
+            every.append(starting(k))
+            if every[-1].interrupted:
+                return _marked(replace(result, interrupted=True), asked, uncertain)
+        spans = {name: every[0][name] for name in ranges.values()}
+        for name in looked_at:
+            numbers_of_it = np.array([one[name] for one in every])
+            spread = 2.0 * np.std(numbers_of_it, axis=0, ddof=1)
+            uncertain[name][left] |= ~(spread <= bearable(name, np.mean(numbers_of_it, axis=0), spans))
+    return _marked(result, asked, uncertain)
+
+
+def _marked(result: EnsembleResult, asked: Sequence[str], uncertain: Mapping[str, np.ndarray]) -> EnsembleResult:
     return replace(result, observables={name: result[name] for name in asked}, uncertain=uncertain)
 
 
