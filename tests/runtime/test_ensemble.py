@@ -475,7 +475,7 @@ def test_segments_made_for_many_are_those_made_for_one(make_model: ModelMaker, t
     columns = table(count)
     begin = model.parameters["mechanism.forces.punch.window.start"]
     here = model.parameters["mechanism.driver.start_angle"]
-    # where the punch's window begins or ends: at the run's start, a hair from it, all around, nowhere
+    # where the punch's window begins or ends: at the run's start, close to it, all around, nowhere
     columns["mechanism.forces.punch.window.start"][:7] = [
         here,
         here + 1e-10,

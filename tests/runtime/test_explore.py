@@ -78,6 +78,31 @@ def test_keys_on_a_slider_give_the_native_run_and_no_request_leaves(press: Model
     assert not browser.complaints
 
 
+#: From a moved slider to redrawn curves, for four turns of the press [s of the processor].
+REDRAWN = 0.05
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+def test_curves_follow_a_slider_within_50_ms(page: Path, browser: Page) -> None:
+    """Time of the page's processor, with layout: other processes on the machine do not count."""
+    browser.call("Performance.enable", timeDomain="threadTicks")
+    browser.open(page)
+    browser.wait(DONE)
+    spent = []
+    for k in range(12):
+        before = browser.busy()
+        browser.value(
+            f"new Promise((done) => {{ change(isNumber.get('bearing.clearance'), {10e-6 + 0.3e-6 * k});"
+            "const look = () => (busy ? setTimeout(look, 5) : requestAnimationFrame(() => setTimeout(done)));"
+            "look(); })"
+        )
+        spent.append(browser.busy() - before)
+    assert browser.value("current !== scene")
+    assert min(spent) < REDRAWN, spent
+
+
 @needs_browser
 @needs_compiler
 @pytest.mark.long

@@ -407,7 +407,7 @@ def test_a_force_that_jumps_agrees_with_events_of_scipy(gated: Model, method: st
 @pytest.mark.parametrize("family", list(FAMILY_ORDERS))
 @pytest.mark.parametrize("above", [0.0, 1e-20, -1e-20, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9])
 def test_grazing_ends(gated: Model, family: str, above: float) -> None:
-    """A ring thrown so high that it touches a ball at rest, or stops a hair before or behind."""
+    """A ring thrown so high that it touches a ball at rest, or stops just before or behind."""
     pull = LOAD / MASS
     start = np.array([0.0, 0.0, -np.sqrt(2.0 * pull * (0.5 * CLEARANCE + above)), 0.0])
     given = {"method": family, "overrides": {"bearing.clearance": CLEARANCE}, "max_steps": 20_000}

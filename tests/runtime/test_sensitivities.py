@@ -28,7 +28,7 @@ def fixed_steps(
     model: Model, family: str, parameters: Mapping[str, float], names: Sequence[str], *, step: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """States at eight times with steps that no parameter changes, and their derivatives along `names`."""
-    # differences look a hair beyond values at their bounds
+    # differences look slightly beyond values at their bounds
     numbers = neighbour(model, model.numbers(), parameters)
     u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)[None, :]
     segments = Segments(times=np.array([0.0, duration]), inputs=u, restarts=np.array([True]))

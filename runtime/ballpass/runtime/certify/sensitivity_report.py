@@ -251,7 +251,7 @@ def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
         heads=("parameter", "% per %", "derivative", *(["verdict"] if judged else [])),
         rows=rows,
         right=("% per %",),
-        wrapped=("verdict",),
+        wrapped=("derivative", "verdict"),
         caption="; ".join(quantity.notes),
         sections=sections,
     )

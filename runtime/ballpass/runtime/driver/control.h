@@ -24,8 +24,8 @@ static const double BP_LIMITED = 0.9, BP_FAR_FROM_LIMIT = 0.3, BP_WORTH_SOLVING 
    the family is kept at a breakpoint. */
 static const double BP_WORTH_TRYING = 1.7, BP_WORTH_KEEPING = 3.0;
 
-/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
-   last the ring flies free. */
+/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below
+   BP_FREE no ball is in contact. */
 static const double BP_HIGH_ORDER = 0.35, BP_LOW_ORDER = 1.2, BP_FREE = 1e-3;
 
 /* Whether limits of the step size [s] are numbers that can be kept to. */

@@ -1,4 +1,4 @@
-/* The rule by which `auto` changes its mind within a segment; single runs and ensembles follow it alike.
+/* When `auto` switches between explicit and linearly implicit steps within a segment, in single runs and ensembles.
 
    An explicit method is left where its steps are as long as stability allows: by the Jacobian, for how far steps reach into a fast
    oscillation of little damping tells the states' differences badly.  A linearly implicit one then shows what its steps are worth.  At

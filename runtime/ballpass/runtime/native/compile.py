@@ -48,7 +48,7 @@ CACHE_VARIABLE = "BALLPASS_CACHE_DIR"
 LEFT_BEHIND = 86_400.0
 
 #: Libraries that this process has opened, by path: they stay open, so that their functions can be had even where
-#: somebody empties the cache meanwhile.
+#: another program empties the cache meanwhile.
 _opened: dict[Path, ctypes.CDLL] = {}
 
 
@@ -254,7 +254,7 @@ def _digest(path: Path) -> str:
 def _clear(folder: Path) -> None:
     """Delete what processes that were killed while compiling left in the cache long ago."""
     for path in folder.glob(".*.tmp"):
-        with contextlib.suppress(OSError):  # gone meanwhile, or of somebody else
+        with contextlib.suppress(OSError):  # gone meanwhile, or of another user
             if time.time() - path.stat().st_mtime > LEFT_BEHIND:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 

@@ -12,12 +12,13 @@ function use(run) {
   [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
 }
 const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
-const all = (signal) => signal.values.map((_, k) => at(signal, k));
+const all = ({ values, decimals }) => { const unit = 10 ** decimals; return values.map((value) => value / unit); };
 const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
 const length = ([x, y]) => Math.hypot(x, y);
 const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
 const short = (value) => Math.round(1e3 * value) / 1e3; // several times as fast as toFixed
-const joined = (places) => places.map(([x, y]) => `${short(x)},${short(y)}`).join(" ");
+const joined = (places) => places.map(([x, y]) => short(x) + "," + short(y)).join(" ");
+const traced = (values, X, Y) => { let text = ""; for (let k = 0; k < values.length; k += 1) text += X(k) + "," + short(Y(values[k])) + " "; return text; };
 const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
 
 function draw(parent, kind, attributes, text = "", node = document.createElementNS("http://www.w3.org/2000/svg", kind)) {
@@ -223,6 +224,7 @@ function drawChart(title, unit, curves) {
   const values = curves.map((curve) => all(curve.signal)), olds = curves.map((curve) => (curve.before ? all(curve.before) : []));
   const shown = [...values, ...olds].flat(), [low, high] = [-highest(shown.map((one) => -one)), highest(shown)];
   const X = (x) => left + (x - begin) / (end - begin || 1) * (width - left - right), Y = (y) => top + (high - y) / (high - low) * (height - top - below);
+  const places = across.map((x) => short(X(x)));
   for (const [from, to] of data.windows) {
     for (let turn = Math.floor(begin / 360) - 1; turn * 360 <= end; turn += 1) {
       const [a, b] = [Math.max(from + 360 * turn, begin), Math.min(to + 360 * turn, end)];
@@ -237,10 +239,10 @@ function drawChart(title, unit, curves) {
   for (const x of marks) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
   draw(picture, "text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, data.turning ? `${data.driver} angle [\u00b0]` : "time [ms]");
   olds.forEach((old) => draw(picture, "polyline", {
-    points: joined(old.map((y, k) => [X(compared.across[k]), Y(y)])), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
+    points: traced(old, (k) => short(X(compared.across[k])), Y), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
   }));
   curves.forEach(({ colour = "var(--ink)", wide = 1.5, dashes = "none" }, n) => draw(picture, "polyline", {
-    points: joined(values[n].map((y, k) => [X(across[k]), Y(y)])), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
+    points: traced(values[n], (k) => places[k], Y), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
   }));
   element(section, "p", [...curves.map((curve) => curve.name), olds.flat().length && "dotted: the scene's numbers", data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
   const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });

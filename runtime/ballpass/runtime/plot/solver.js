@@ -118,12 +118,13 @@ function peaks(run, measures, series) {
 }
 
 // ---------------------------------------------------------------------------------------------------- from run to page
-const signalOf = (values, most = highest(values.map(Math.abs))) => {
-  const decimals = most > 1e-12 ? 4 - Math.floor(Math.log10(most)) : 0;
-  return { decimals, values: values.map((value) => value * 10 ** decimals) };
+const greatest = (values, most = 1e-12) => values.reduce((found, value) => Math.max(found, Math.abs(value)), most);
+const signalOf = (values, most = greatest(values)) => {
+  const decimals = most > 1e-12 ? 4 - Math.floor(Math.log10(most)) : 0, unit = 10 ** decimals;
+  return { decimals, values: values.map((value) => value * unit) };
 };
 // Signals of one kind have the same decimals.
-const signalsOf = (columns) => { const most = highest(columns.flat().map(Math.abs)); return columns.map((values) => signalOf(values, most)); };
+const signalsOf = (columns) => { const most = columns.reduce((found, values) => greatest(values, found), 1e-12); return columns.map((values) => signalOf(values, most)); };
 
 function angleOf(run, row) {
   if (solver.angle !== null) return row[solver.angle];
@@ -169,9 +170,9 @@ function drawnOf(run) {
   if (turning) while (begins + 1 < run.count && Math.abs(angles[run.count - 1] - angles[begins + 1]) >= TURN * solver.shown * (1 - 1e-9)) begins += 1;
   // every bearing's highest force is among the positions
   const tops = solver.bearings.map((bearing) => {
-    let best = [-Infinity, begins];
-    for (let k = begins; k < run.count; k += 1) best = bearing.force.reduce((most, column) => (row(k)[column] > most[0] ? [row(k)[column], k] : most), best);
-    return best;
+    let [most, top] = [-Infinity, begins];
+    for (let k = begins; k < run.count; k += 1) for (const column of bearing.force) if (run.rows[k * width + column] > most) [most, top] = [run.rows[k * width + column], k];
+    return [most, top];
   }), stride = Math.ceil((run.count - begins - 1) / 1000), chosen = [];
   for (let k = begins; k < run.count; k += 1) if ((k - begins) % stride === 0 || k === run.count - 1 || tops.some((top) => top[1] === k)) chosen.push(k);
   const peak = tops.length ? tops.reduce((best, top) => (top[0] > best[0] ? top : best))[1] : begins;
