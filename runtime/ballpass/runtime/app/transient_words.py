@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ballpass.runtime.app.summary import TABLE_UNITS
-from ballpass.runtime.certify.transient import still_changes
+from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.run.request import Request
@@ -57,13 +57,14 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     if asked or longer is None or model.manifest.run.stated:
         return []
     found = still_changes(run)
-    if not found.uncertain:
+    names = remembered(found)
+    if not names:
         return []
-    name = max(found.uncertain, key=lambda channel: found.changes[channel])
+    name = max(names, key=lambda channel: found.changes[channel])
     return [
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
         f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
-        f"{', '.join(found.uncertain)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
+        f"{', '.join(names)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
         "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
     ]
 
