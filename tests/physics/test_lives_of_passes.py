@@ -100,6 +100,22 @@ def test_lives_of_random_tables_are_sums_over_passes(press: Model) -> None:
         assert abs(found.speed) == pytest.approx(expected["speed"], rel=1e-3)
 
 
+def test_a_driver_that_starts_at_rest_has_a_life(press: Model) -> None:
+    """Rows of 0 rpm are legal, and no ball passes there: the first one was taken for a bearing that does not turn."""
+    rpm = np.array([0.0, 500.0, 500.0, 600.0, 600.0, 0.0])
+    parameters = numbers(0.2 * np.arange(ROWS), rpm, np.full(ROWS, 800.0), np.full(ROWS, 300.0))
+    (found,) = press.life(parameters=parameters).bearings
+    expected = summed(press, parameters)
+    for name in ("mean", "miner", "sectors"):
+        assert found.lives[name] == pytest.approx(expected[name], rel=0.01), name
+    assert found.speed == pytest.approx(expected["speed"], rel=1e-3)
+    assert press.quantities("life_mean", parameters=parameters)["life_mean"].value == pytest.approx(
+        found.lives["mean"], rel=1e-3
+    )
+    (still,) = press.life(parameters=numbers(0.2 * np.arange(ROWS), 0.0 * rpm, 0.0 * rpm, 800.0 + 0.0 * rpm)).bearings
+    assert "does not turn" in still.why_no_life
+
+
 def halves(slow: float, fast: float, half: float) -> dict[str, float]:
     """100 rpm for so many seconds, then 900, with a load along y in each."""
     # the load rises, for what falls on a ring at rest is an impact

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pickle
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -335,3 +336,15 @@ def test_nan_among_the_parameters_is_nan_with_a_warning(make_model: Callable[...
     function = QuantityFunction(model, "rms:inner.y", ["shaft.speed"], cycles=22, failed="nan")
     with pytest.warns(UnknownValueWarning, match=r"a parameter is no finite number \(shaft.speed = nan\)"):
         assert np.isnan(function([np.nan]))
+
+
+def test_nan_input_does_not_use_up_the_warning_of_a_run_that_fails(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    function = QuantityFunction(model, "rms:inner.y", ["load.force.x"], cycles=1, transient=0, failed="nan")
+    with pytest.warns(UnknownValueWarning, match="no finite number"):
+        function([np.nan])
+    with pytest.warns(UnknownValueWarning, match="a ball is flattened by"):
+        assert np.isnan(function([1.5e6]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        function([[np.nan], [1.5e6]])  # each was said

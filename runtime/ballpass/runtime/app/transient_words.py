@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.app.summary_words import inside, row_words
-from ballpass.runtime.certify.transient import still_changes
+from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.run.request import Request
@@ -58,13 +58,14 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     if asked or longer is None or model.manifest.run.stated:
         return []
     found = still_changes(run)
-    if not found.uncertain:
+    names = remembered(found)
+    if not names:
         return []
-    name = max(found.uncertain, key=lambda channel: found.changes[channel])
+    name = max(names, key=lambda channel: found.changes[channel])
     return [
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
         f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
-        f"{', '.join(found.uncertain)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
+        f"{', '.join(names)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
         "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
     ]
 
@@ -82,6 +83,6 @@ def _start_words(model: Model, longer: Settled) -> str:
     words = inside(row_words(model.manifest, names[0]))
     return (
         f"extremes of the start, not of the steady machine: {words} ({names[0]}) has its {kind} of "
-        f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. Drop more turns "
-        "(--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
+        f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. "
+        "Drop more turns (--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
     )

@@ -70,7 +70,8 @@ def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Re
 
 def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo, request: Request) -> StateStrength:
     numbers = model.numbers(parameters)
-    if state.name and driver_angle.shaft_speed(model.manifest, numbers.values) == 0.0:
+    moving = model.numbers({**parameters, **driver_angle.set_moving(model.manifest, numbers.values)})
+    if state.name and driver_angle.shaft_speed(model.manifest, moving.values) == 0.0:
         return StateStrength(
             name=state.name, share=state.share, bearings=(), turns=None, change=0.0, settled=True, samples=0
         )
@@ -80,7 +81,8 @@ def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo,
         name=state.name,
         share=state.share,
         bearings=tuple(
-            _bearing(model, numbers, info, history, samples[info.prefix]) for info in model.manifest.bearings
+            _bearing(model, numbers, moving.values, info, history, samples[info.prefix])
+            for info in model.manifest.bearings
         ),
         turns=history.turns,
         change=history.change,
@@ -90,16 +92,21 @@ def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo,
 
 
 def _bearing(
-    model: LoadedModel, numbers: Numbers, info: BearingInfo, history: LoadHistory, samples: LoadSamples
+    model: LoadedModel,
+    numbers: Numbers,
+    moving: Mapping[str, float],
+    info: BearingInfo,
+    history: LoadHistory,
+    samples: LoadSamples,
 ) -> BearingStrength:
+    """Strength of one bearing; `moving` are its numbers with the driver at speed."""
     manifest, values = model.manifest, numbers.values
     ratings = ratings_of(info, values)
-    initial = driver_angle.shaft_speed(manifest, values)
     peak = history.peaks[info.prefix]
     force, nominal = max(peak.maximum, 0.0), float(geometry_of(info, values).nominal_cosine)
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
-    why = why_no_life(info, values, initial)
-    speed = 0.0 if why else math.copysign(history.speeds[info.prefix], values[info.ring_speed])
+    why = why_no_life(info, moving, driver_angle.shaft_speed(manifest, moving))
+    speed = 0.0 if why else math.copysign(history.speeds[info.prefix], moving[info.ring_speed])
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
     load = samples.equivalent_load(float(ratings.life.basic))

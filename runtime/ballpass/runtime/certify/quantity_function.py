@@ -133,7 +133,7 @@ class QuantityFunction:
         self._free: defaultdict[tuple[int, ...], list[QuantityRun]] = defaultdict(list)
         self._slope_rtol = max(FUNCTION_SLOPES * self._rtol, TOLERANCES[0])
         self._all = tuple(range(len(self.of)))
-        self._said: set[tuple[type[BallpassWarning], str]] = set()
+        self._said: set[tuple[type[BallpassWarning], str, str]] = set()
         resolve(model, numbers, self._request).check_steady()  # a wrong length is refused now
 
     def __getstate__(self) -> dict[str, Any]:
@@ -302,7 +302,8 @@ class QuantityFunction:
         able = np.flatnonzero(finite | (self._failed == "raise"))
         if self._failed == "nan" and len(able) < len(rows):
             row = rows[np.flatnonzero(~finite)[0]]
-            self._warn(UnknownValueWarning, [(name, row, "a parameter is no finite number") for name in self.of])
+            told = [(name, row, "a parameter is no finite number") for name in self.of]
+            self._warn(UnknownValueWarning, told, "input")
         return rows, able, given.shape[:-1]
 
     def _numbers(self, row: Array) -> Numbers:
@@ -386,12 +387,12 @@ class QuantityFunction:
         self._free[of].append(along)
         return found.estimates
 
-    def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]]) -> None:
-        """Warn, once for each quantity."""
+    def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]], cause: str = "run") -> None:
+        """Warn, once for each quantity and cause: wrong input must not silence what a run says."""
         fresh: dict[str, list[str]] = {}
         for name, row, words in told:
-            if (kind, name) not in self._said:
-                self._said.add((kind, name))
+            if (kind, cause, name) not in self._said:
+                self._said.add((kind, cause, name))
                 fresh.setdefault(f"{words} ({self._told(row)})", []).append(name)
         for words, names in fresh.items():
             warnings.warn(f"{_some(names)}: {words}. Said once of each quantity.", kind, stacklevel=4)

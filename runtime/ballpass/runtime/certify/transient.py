@@ -24,6 +24,9 @@ from ballpass.runtime.run.settle import repeats
 #: How far the rings are moved at the start, in their magnitudes [1]: what a start at rest is off by.
 MOVED = 0.1
 
+#: Change of an extreme or rms by a moved start, over the largest, that counts as none [1]: other turns differ by more.
+FORGOTTEN = 2e-3
+
 #: Steps that the search may take: about a second.
 SEARCH = 400_000
 
@@ -45,13 +48,18 @@ def find_transient(model: LoadedModel) -> RunInfo:
         while left > 0:
             run = resolve(model, numbers, Request(cycles=transient + length, transient_cycles=transient))
             found = still_changes(run)
-            if not found.uncertain:
+            if not remembered(found):
                 return replace(given, cycles=transient + length, transient_cycles=transient)
             transient *= 2.0
             left -= 2 * found.steps
     except (RequestError, SimulationError):
         pass  # the run that is asked for says what is wrong
     return given
+
+
+def remembered(found: Growth) -> list[str]:
+    """Channels that have not forgotten the start."""
+    return [name for name in found.uncertain if found.changes[name] > FORGOTTEN]
 
 
 def still_changes(run: Run) -> Growth:

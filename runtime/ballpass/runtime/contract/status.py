@@ -32,6 +32,7 @@ class Status(Enum):
         "The driver has stalled: at the edge of a window it turns back again and again. Give the drive more torque or "
         "a heavier flywheel, a higher initial speed, or less load."
     )
+    VOID = "The rings moved as they do in no bearing."
     INTEGRATOR_FAILED = (
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
         "Try a looser rtol, or check initial state and parameters."

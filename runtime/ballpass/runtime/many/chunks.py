@@ -16,10 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import is_void, void_words
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.locating import Kinks
@@ -247,6 +249,13 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
             state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
             status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
         work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
+    if rows is not None:
+        void = is_void(work.model.manifest, {name: all_[which] for name, all_ in work.members.columns.items()}, rows)
+        for place in np.flatnonzero(void & (results["status"] == End.DONE)).tolist():
+            member, time = int(which[place]), float(results[place]["time"])
+            values = {name: float(all_[member]) for name, all_ in work.members.columns.items()}
+            why = void_words(work.model.manifest, values, rows[place])
+            work.results[member] = MemberFailure(member=member, status=Status.VOID.name, time=time, message=why)
     return counts
 
 

@@ -8,7 +8,7 @@ the inner ring turns against the outer one, for fatigue counts passes.  Behind a
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TypeAlias
@@ -31,6 +31,9 @@ BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball
 #: Behind these for each bearing: means over its balls of powers of their loads, see `LoadPowers` of the readings, and
 #: one, whose integral is the angle that the inner ring turned against the outer one [rad].
 LOAD_POWERS = ("load.turning", "load.standing", "load.outer_damage", "load.turned")
+
+#: The channel that shows whether a bearing can be so, and the largest share of a ball's diameter that it may be [1].
+DEFLECTION, FLATTENED = "ball.deflection", 0.1
 
 #: Places of a raceway.
 SECTORS = 72
@@ -87,12 +90,51 @@ class ReductionRows:
         return self._columns[kind, channel]
 
     def empty(self, count: int, start: ArrayLike, channels: Collection[str]) -> np.ndarray:
-        """Rows of reductions of these channels that count from `start` on [s], shape (count, size)."""
+        """Rows of reductions of these channels that count from `start` on [s], shape (count, size).
+
+        Where there are any, the deflection of the balls is among them: it shows whether a bearing can be so.
+        """
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")] = start
         for name in self.channels:
-            rows[:, self.column("wanted", name)] = name in channels
+            rows[:, self.column("wanted", name)] = name in channels or (bool(channels) and name.endswith(DEFLECTION))
         return rows
+
+
+def is_void(manifest: Manifest, values: Mapping[str, ArrayLike], rows: Array) -> NDArray[np.bool_]:
+    """Whether runs mean nothing, by their reductions, shape (runs,).
+
+    A ball is flattened by more than a tenth, or the rings are displaced by more than a ball.
+    """
+    void = np.zeros(len(rows), dtype=bool)
+    for path, deflection in _deflections(manifest, rows):
+        ball, clearance = (np.asarray(values[f"{path}.{key}"]) for key in ("ball_diameter", "clearance"))
+        void |= (deflection > FLATTENED * ball) | (deflection + clearance / 2.0 > ball)
+    return void
+
+
+def void_words(manifest: Manifest, values: Mapping[str, float], row: Array) -> str:
+    """Why a run means nothing; empty where it is not void."""
+    for path, (deflection,) in _deflections(manifest, row[None, :]):
+        ball, displaced = values[f"{path}.ball_diameter"], deflection + values[f"{path}.clearance"] / 2.0
+        if deflection > FLATTENED * ball or displaced > ball:
+            what = (
+                f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
+                if deflection > FLATTENED * ball
+                else f"the rings are displaced by {1e3 * displaced:.4g} mm, more than a ball's diameter"
+            )
+            return (
+                f"{path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
+                "clearance, give more damping, or check stiffness, masses and their units."
+            )
+    return ""
+
+
+def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[str, Array]]:
+    """Of each bearing, by its path: largest deflection of a ball in each run [m]."""
+    layout = reduction_rows(manifest)
+    for bearing in manifest.bearings:
+        yield bearing.path, rows[:, layout.column("max", bearing.prefix + DEFLECTION)]
 
 
 def moments_of(shift: Array, integral: Array, square: Array, duration: Array) -> tuple[Array, Array]:

@@ -44,6 +44,7 @@ class End(IntEnum):
     NOT_FINITE = 3
     BAD_ARGUMENT = 4
     STALLED = 5
+    VOID = 7  # by the reductions of a run that reached its end
 
 
 class _Options(ctypes.Structure):

@@ -52,6 +52,14 @@ def speed_name(manifest: Manifest) -> str | None:
     return None if manifest.bearing is None else manifest.bearing.ring_speed
 
 
+def set_moving(manifest: Manifest, values: Values) -> dict[str, float]:
+    """The first speed of a table that starts at rest, replaced by its fastest: which bearings turn then shows."""
+    for item in manifest.inputs:
+        if item.name == DRIVER_ACCELERATION and values[item.values[0]] == 0.0:
+            return {item.values[0]: max((values[name] for name in item.values), key=abs)}
+    return {}
+
+
 def crank_angle(manifest: Manifest, values: Values, t: float, state: np.ndarray | None = None) -> float:
     """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad].
 

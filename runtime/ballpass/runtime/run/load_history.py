@@ -140,13 +140,15 @@ def _history(going: ReducedRun) -> LoadHistory:
 def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
     """Loads so far, with the change since the last ones."""
     found = _history(going)
-    values = going.run.numbers.values
+    model, values = going.run.model, going.run.numbers.values
+    moving = {**going.run.numbers.parameters, **driver_angle.set_moving(model.manifest, values)}
+    turning = model.numbers(moving).values
     life, peak = 0.0, 0.0
     for bearing in going.run.model.manifest.bearings:
         prefix = bearing.prefix
         now, then = (h.peaks[prefix].maximum for h in (found, before))
         peak = max(peak, abs(1.0 - then / now) if now > 0.0 else 0.0)
-        if not why_no_life(bearing, values, found.shaft_speed):
+        if not why_no_life(bearing, turning, driver_angle.shaft_speed(model.manifest, turning)):
             ratings = ratings_of(bearing, values)
             now_by, then_by = (lives(ratings, history.powers[prefix]) for history in (found, before))
             life = max(life, *(_moved(now_by[name], then_by[name]) for name in now_by))

@@ -20,6 +20,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.method_registry import CHOICE, STEPPERS
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.reduction_rows import void_words
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
 from ballpass.runtime.run.failure_location import FailureLocation, locate_failure, stall_words
 from ballpass.runtime.run.limits import allowance
@@ -40,6 +41,7 @@ STATUS_OF_END = {
     End.NOT_FINITE: Status.NOT_FINITE,
     End.BAD_ARGUMENT: Status.INTEGRATOR_FAILED,
     End.STALLED: Status.STALLED,
+    End.VOID: Status.VOID,
 }
 
 
@@ -260,6 +262,16 @@ class RunUnderWay:
                         break
                     left, first_step = rest, outcome.step
         self.time = until
+        self._refuse_void()
+
+    def _refuse_void(self) -> None:
+        """Refuse results in which a ball is flattened as none can be."""
+        run = self.run
+        for sink in self.sinks:
+            why = void_words(run.model.manifest, run.numbers.values, sink.row) if isinstance(sink, ReductionRow) else ""
+            if why:
+                place = locate_failure(run.model, run.numbers, self.time, self.state)
+                raise RunFailed(End.VOID, self.time, 0.0, self.state, place, why)
 
     def _count(self, outcome: Outcome) -> None:
         self.steps += outcome.steps

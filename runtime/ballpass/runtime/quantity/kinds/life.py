@@ -20,7 +20,7 @@ from ballpass.runtime.ratings.life import ElementLife
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
 from ballpass.runtime.ratings.readings import KINDS as READINGS_OF
-from ballpass.runtime.run.driver_angle import TURN, shaft_speed
+from ballpass.runtime.run.driver_angle import TURN, set_moving, shaft_speed
 from ballpass.runtime.run.reductions import load_powers
 
 Array = NDArray[np.float64]
@@ -67,7 +67,8 @@ def _bearing(manifest: Manifest, quantity: Quantity) -> BearingInfo:
 
 
 def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
-    refuse_swinging(_bearing(manifest, quantity), values, shaft_speed(manifest, values))
+    moving = {**values, **set_moving(manifest, values)}
+    refuse_swinging(_bearing(manifest, quantity), moving, shaft_speed(manifest, moving))
 
 
 def _moved(dual: Dual) -> NDArray[np.complex128]:
