@@ -32,6 +32,7 @@ from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -131,6 +132,7 @@ def _unusual(sol: Solution) -> list[str]:
     """
     said = []
     for bearing in sol.manifest.bearings:
+        noun = rated_element(bearing).noun
         ball, clearance = (sol.parameters[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
         apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
@@ -138,9 +140,9 @@ def _unusual(sol: Solution) -> list[str]:
         deflection = displacement - clearance / 2.0
         if deflection > FLATTENED * ball or displacement > ball:
             what = (
-                f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
+                f"a {noun} is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
                 if deflection > FLATTENED * ball
-                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a ball's diameter"
+                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a {noun}'s diameter"
             )
             raise SimulationError(
                 f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
@@ -148,8 +150,9 @@ def _unusual(sol: Solution) -> list[str]:
             )
         if deflection > MOST_DEFLECTION * ball:
             said.append(
-                f"{bearing.path}: a ball is deflected by {1e6 * deflection:.4g} um, {100.0 * deflection / ball:.3g} % "
-                f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
+                f"{bearing.path}: a {noun} is deflected by {1e6 * deflection:.4g} um, "
+                f"{100.0 * deflection / ball:.3g} % of its diameter: unusual. "
+                f"Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
                 "beyond. Check loads, stiffness and their units."
             )
     return said
