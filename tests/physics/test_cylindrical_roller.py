@@ -150,7 +150,7 @@ def test_ratings_of_the_table_are_those_of_catalogues(name: str) -> None:
 
 
 def test_defect_frequencies_are_those_of_vibration_tables() -> None:
-    """BPFO and BPFI that tables for vibration measurements print: the number of rollers, and their share of the pitch."""
+    """BPFO and BPFI in tables for vibration measurements: number of rollers, and their share of the pitch."""
     for name, outer, inner in (("NU205", 5.25, 7.75), ("NU206", 5.242, 7.756)):
         kind = bearing_types()[name]
         gamma = float(kind.ball_diameter / kind.pitch_diameter)
@@ -245,13 +245,25 @@ def test_life_of_a_constant_load_by_hand(rotor: Model) -> None:
     )
 
 
-def own_run(count: int, cage: float, moments: np.ndarray) -> np.ndarray:
-    """The rotor in its rollers by SciPy; `cage` is their speed over that of the shaft."""
-    psi, speed = 2.0 * np.pi * np.arange(count) / count, 393.1540342298 * math.pi / 30.0 * cage
+def own_run(
+    count: int,
+    cage: float,
+    moments: np.ndarray,
+    stiffness: float = STIFFNESS,
+    raised: Callable[[np.ndarray, float], np.ndarray | float] = lambda psi, turned: 0.0,
+) -> np.ndarray:
+    """The rotor in its rollers by SciPy.
+
+    `cage` is their speed over that of the shaft; `raised` the deflection that effects add, of the angles of the rollers
+    and of the shaft [m].
+    """
+    psi, shaft = 2.0 * np.pi * np.arange(count) / count, 393.1540342298 * math.pi / 30.0
+    speed = cage * shaft
 
     def rate(t: float, x: np.ndarray) -> np.ndarray:
         cos, sin = np.cos(psi + speed * t), np.sin(psi + speed * t)
-        force = STIFFNESS * np.maximum(x[0] * cos + x[1] * sin, 0.0) ** EXPONENT
+        added = raised(psi + speed * t, shaft * t)
+        force = stiffness * np.maximum(x[0] * cos + x[1] * sin + added, 0.0) ** EXPONENT
         return np.array([*x[2:], (LOAD - force @ cos - DAMPING * x[2]) / MASS, -(force @ sin + DAMPING * x[3]) / MASS])
 
     start, end = [3.9937e-6, 1e-7, 0.0, 0.0], moments[-1]
@@ -264,6 +276,84 @@ def test_varying_compliance_is_that_of_an_own_model(rotor: Model) -> None:
     run = rotor.simulate(cycles=0.2, transient=0, rtol=1e-12, samples_per_cycle=400)
     own = own_run(ROLLERS, CAGE, run.t)
     assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
+
+
+#: Every effect at once, and a cage that lags.
+EFFECTS = """[bearing.outer_waviness]
+7 = { amplitude = "0.5 um", phase = "0.4 rad" }
+[bearing.inner_waviness]
+9 = { amplitude = "0.2 um", phase = "0.3 rad" }
+[bearing.ball_waviness.each]
+4 = { amplitude = "0.1 um", phase = "1 rad" }
+[bearing.ball_deviation]
+5 = "-0.2 um"
+[bearing.defects.flake]
+on = "outer"
+angle = "10 deg"
+chord = "2 mm"
+depth = "3 um"
+profile = "half-sine"
+[bearing.defects.pit]
+on = "inner"
+angle = "-60 deg"
+chord = "2 mm"
+depth = "1 um"
+profile = "half-sine"
+[bearing.cage]
+slip = 0.02
+[bearing.inner_ring]"""
+
+
+def own_effects(psi: np.ndarray, turned: float) -> np.ndarray:
+    """What `EFFECTS` add to the deflections: psi, angles of the rollers; turned, angle of the shaft."""
+    seen = psi - turned  # by the inner ring
+    rolled = (1.0 + PITCH / DIAMETER) * psi[0]  # roller 1 is at 0 at the start
+    added = 0.5e-6 * np.cos(7 * psi + 0.4) + 0.2e-6 * np.cos(9 * seen + 0.3) + 0.2e-6 * np.cos(4 * rolled + 1.0)
+    added[4] -= 0.2e-6
+    for angle, middle, radius, depth in (
+        (psi, math.radians(10.0), (PITCH + DIAMETER) / 2.0, 3e-6),
+        (seen, math.radians(-60.0), (PITCH - DIAMETER) / 2.0, 1e-6),
+    ):
+        along = radius * np.sin(angle - middle)
+        over = (np.abs(along) < 1e-3) & (np.cos(angle - middle) > 0.0)
+        added -= np.where(over, depth * np.cos(np.pi * along / 2e-3), 0.0)
+    return added
+
+
+def test_every_effect_is_that_of_an_own_model(make_model: Callable[..., Model]) -> None:
+    """Waves, a thin roller, two spalls and slip: motion of the rotor against SciPy, 1e-8 of the motion."""
+    model = make_model("varying_compliance", *ROLLER, ("[bearing.inner_ring]", EFFECTS))
+    run = model.simulate(cycles=0.3, transient=0, rtol=1e-12, samples_per_cycle=400)
+    own = own_run(ROLLERS, 0.98 * CAGE, run.t, raised=own_effects)
+    assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
+    plain = own_run(ROLLERS, CAGE, run.t)
+    assert np.max(np.abs(plain - own) / np.max(np.abs(own), axis=0)) > 0.01
+
+
+#: The cage with needles of docs/theory/rollers.md, for which NSK prints C_r 16800 N and C_0r 21200 N.
+NEEDLES = (
+    ("balls = 8\n", 'element = "cylindrical-roller"\nballs = 14\n'),
+    ('"7.9375 mm"', '"3 mm"'),
+    ('"33.5 mm"', '"23 mm"'),
+    (ROLLER[3][0], ROLLER[3][1].replace("8 mm", "13.2 mm")),
+)
+
+
+def test_needles_are_rollers(make_model: Callable[..., Model]) -> None:
+    """A cage with needles by hand: motion against SciPy, ratings against the printed ones, life by the formula."""
+    page = (Path(__file__).parents[2] / "docs" / "theory" / "rollers.md").read_text(encoding="utf-8")
+    assert all(text in page for text in ("balls = 14", '"3 mm"', '"23 mm"', '"13.2 mm"'))
+    model = make_model("varying_compliance", *NEEDLES)
+    run = model.simulate(cycles=0.2, transient=0, rtol=1e-12, samples_per_cycle=400)
+    stiffness = (2.0 * 3.84e-5 * 1e-3 * 13.2**-0.8) ** -EXPONENT
+    own = own_run(14, (1.0 - 3.0 / 23.0) / 2.0, run.t, stiffness)
+    assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
+    ratings = ratings_of(model.manifest.bearings[0], model.numbers({}).values)
+    assert ratings.dynamic == pytest.approx(16800.0, rel=3e-3)
+    assert ratings.static == pytest.approx(21200.0, rel=1e-3)
+    slow = {"shaft.speed": 1.0, "bearing.inner_ring.damping": 2e3}
+    (found,) = model.life(cycles=1.2, transient=0.2, parameters=slow).bearings
+    assert found.basic_life == pytest.approx(1e6 * (ratings.dynamic / LOAD) ** (10 / 3), rel=1e-3)
 
 
 def test_lanes_and_single_runs_agree(rotor: Model) -> None:

@@ -32,7 +32,10 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
-SHORT, LONG = ("punching_press", "varying_compliance"), ("punching_press_tangent", "four_bar", "offset_slider")
+SHORT, LONG = (
+    ("punching_press", "varying_compliance"),
+    ("punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
+)
 MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
 

@@ -155,17 +155,19 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
 
 def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
     of = f" of {bearing.name}" if bearing.name else ""
+    element = ELEMENTS[bearing.element]
     yield Feature(
-        name=f"ball contacts{of}",
+        name=f"{element.noun} contacts{of}",
         path=f"{bearing.path}.contact",
-        modelled=f"{bearing.balls} {ELEMENTS[bearing.element].noun}s at the cage's angles, Hertz force of each",
+        modelled=f"{bearing.balls} {element.noun}s at the cage's angles, {element.force_words} of each",
         without=None,
     )
     if bearing.coupling == "two-way":
         yield Feature(
             name=f"coupling{of}",
             path=f"{bearing.path}.coupling",
-            modelled=f"play of joint {bearing.joint} moves the linkage, forces of the balls act on both bodies",
+            modelled=f"play of joint {bearing.joint} moves the linkage, "
+            f"forces of the {element.noun}s act on both bodies",
             without=_one_way(scene, bearing),
         )
     if bearing.contact.smoothing is not None:
@@ -181,7 +183,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
         yield Feature(
             name=f"contact damping{of}",
             path=f"{bearing.path}.damping",
-            modelled=f"law {bearing.damping.law} at each ball",
+            modelled=f"law {bearing.damping.law} at each {element.noun}",
             without=_with(scene, undamped),
         )
     if bearing.damping.smoothing is not None:

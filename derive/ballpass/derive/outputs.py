@@ -34,22 +34,23 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
             Output(name=name, expression=c.velocity, unit=f"{c.unit}/s", description=f"Velocity {c.description}")
         )
     ball = bearing.ball
+    noun = bearing.noun
     per_ball = [
-        (ball.deflection, "m", "Deflection of each ball, Eq. (6)"),
-        (ball.elastic_force, "N", "Elastic force of each ball, Eq. (4)"),
+        (ball.deflection, "m", f"Deflection of each {noun}, Eq. (6)"),
+        (ball.elastic_force, "N", f"Elastic force of each {noun}, Eq. (4)"),
     ]
     if ball.damping_force is not None:
-        per_ball.append((ball.damping_force, "N", "Damping force of each ball, Eq. (10)"))
-    per_ball.append((ball.force, "N", "Elastic and damping force of each ball"))
+        per_ball.append((ball.damping_force, "N", f"Damping force of each {noun}, Eq. (10)"))
+    per_ball.append((ball.force, "N", f"Elastic and damping force of each {noun}"))
     out += [
         Output(name=s.name, expression=s, unit=u, description=d + of, balls_of=prefix, per_ball=True)
         for s, u, d in per_ball
     ]
     for ring, angle in (("outer", ball.in_outer), ("inner", ball.in_inner)):
-        words = f"Angle of ball 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
+        words = f"Angle of {noun} 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
         out.append(Output(name=f"{prefix}cage.in_{ring}", expression=angle, unit="rad", description=words))
     for axis, total in zip("xy", ball.ring_force, strict=True):
-        words = f"Force of the inner ring on the balls{of} along {axis}, Eqs. (8) and (9)"
+        words = f"Force of the inner ring on the {noun}s{of} along {axis}, Eqs. (8) and (9)"
         out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total, unit="N", description=words))
     for axis, force in zip("xy", load or (), strict=False):
         words = f"External load on the inner ring{of} along {axis}"

@@ -80,6 +80,7 @@ class BearingModel:
     """Contact between the rings of one bearing, over coordinates of the rings."""
 
     names: Names
+    noun: str  # of an element
     constants: tuple[Definition, ...]
     coordinates: tuple[Coordinate, ...]
     ball: BallRelations
@@ -112,6 +113,7 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     ball, gradient, parts = _ball(bearing, names, coordinates, cage)
     return BearingModel(
         names=names,
+        noun=ELEMENTS[bearing.element].noun,
         constants=tuple(constants),
         coordinates=coordinates,
         ball=ball,

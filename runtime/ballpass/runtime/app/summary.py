@@ -33,7 +33,7 @@ from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
+from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap, rated_element
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -134,6 +134,7 @@ def _unusual(sol: Solution) -> list[str]:
     """
     said = []
     for bearing in sol.manifest.bearings:
+        noun = rated_element(bearing).noun
         ball = sol.parameters[f"{bearing.path}.ball_diameter"]
         known = {**sol.parameters, **sol.constants}
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
@@ -142,9 +143,9 @@ def _unusual(sol: Solution) -> list[str]:
         deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
         if deflection > FLATTENED * ball or displacement > ball:
             what = (
-                f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
+                f"a {noun} is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
                 if deflection > FLATTENED * ball
-                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a ball's diameter"
+                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a {noun}'s diameter"
             )
             raise SimulationError(
                 f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
@@ -152,8 +153,9 @@ def _unusual(sol: Solution) -> list[str]:
             )
         if deflection > MOST_DEFLECTION * ball:
             said.append(
-                f"{bearing.path}: a ball is deflected by {1e6 * deflection:.4g} um, {100.0 * deflection / ball:.3g} % "
-                f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
+                f"{bearing.path}: a {noun} is deflected by {1e6 * deflection:.4g} um, "
+                f"{100.0 * deflection / ball:.3g} % of its diameter: unusual. "
+                f"Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
                 "beyond. Check loads, stiffness and their units."
             )
     return said

@@ -62,7 +62,8 @@ def row_words(manifest: Manifest, name: str) -> str:
     whose = f" of {prefix.removesuffix('.')}" if prefix else ""
     if own in _ADDED:
         noun = next((rated_element(one).noun for one in manifest.bearings if one.prefix == prefix), "ball")
-        return f"{_ADDED[own].replace('ball', noun)}{',' + whose.removeprefix(' of') if whose else ''}"
+        words = _ADDED[own].replace("ball", noun).replace("Ball", noun.capitalize())
+        return f"{words}{',' + whose.removeprefix(' of') if whose else ''}"
     infos = (*manifest.states, *manifest.outputs)
     found = next((info.description for info in infos if info.name == name), "")
     paths = {f"{bearing.path}.{own}" for bearing in manifest.bearings if bearing.prefix == prefix}

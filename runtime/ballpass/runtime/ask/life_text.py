@@ -159,12 +159,13 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
             ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
             ("share of the damage", *(f"{100.0 * sum(ring.damage):.0f} %" for ring in rings)),
         ]
-    rows += [
-        ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
-        ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
-        ("its angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
-        ("its distance from the groove's centre", *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings)),
-    ]
+    if any(ring.wear[1] > 0.0 for ring in rings):  # a straight roller does not slip
+        rows += [
+            ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
+            ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
+            ("its angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
+            (f"its distance from the {element.middle}", *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings)),
+        ]
     parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
         f"  {_verdict(bearing)}",

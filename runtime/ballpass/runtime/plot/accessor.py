@@ -15,6 +15,7 @@ from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.plot.animate import animation_page, write_animation
+from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
@@ -89,8 +90,10 @@ class SolutionPlot:
             for name in chosen:
                 lines = axes.plot(steady.t, factor * steady[name], linewidth=1.0)
                 count = len(lines)
+                owners = (one for one in steady.manifest.bearings if name.startswith(f"{one.prefix}ball."))
+                noun = next((rated_element(one).noun for one in owners), "ball")
                 for number, line in enumerate(lines, start=1):
-                    line.set_label(name if count == 1 else f"{name}, ball {number}")
+                    line.set_label(name if count == 1 else f"{name}, {noun} {number}")
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"{', '.join(chosen) if len(chosen) <= _NAMED else 'outputs'} [{shown}]")
             if 1 < len(axes.get_lines()) <= _LEGEND:
@@ -193,7 +196,7 @@ class SolutionPlot:
                 height = foot + 0.9 * force[:, ball] / top
                 axes.fill_between(along, foot, height, linewidth=0.0, alpha=0.35, color="C0")
                 axes.plot(along, height, linewidth=0.8, linestyle="-", color="C0")
-            axes.set_yticks(range(balls, 0, -1), [f"ball {ball}" for ball in range(1, balls + 1)])
+            axes.set_yticks(range(balls, 0, -1), [f"{record.noun} {ball}" for ball in range(1, balls + 1)])
             axes.set_xlim(float(along.min()), float(along.max()))
             axes.set_xlabel(label)
             axes.set_ylabel(f"contact load, highest {top:.4g} N")

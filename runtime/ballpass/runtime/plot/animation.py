@@ -288,6 +288,7 @@ def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
     furthest = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
     return {
         "name": bearing.name or "",
+        "noun": record.noun,
         "words": words,
         "balls": bearing.balls,
         "pitch": record.parameter("bearing.pitch_diameter"),

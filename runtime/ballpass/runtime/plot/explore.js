@@ -92,8 +92,8 @@ function resultsOf(run) {
   };
   solver.bearings.forEach((bearing, k) => {
     const name = numbers.bearings[k].name, of = name && ` of ${name}`, id = name && `${name}.`;
-    const force = peak(`${id}peak_ball_force`, `Highest ball force${of}`, "N", (row) => { let most = -Infinity; for (const column of bearing.force) if (row[column] > most) most = row[column]; return most; });
-    rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ball${of}`, "N", rms(run, force));
+    const force = peak(`${id}peak_ball_force`, `Highest ${numbers.bearings[k].noun} force${of}`, "N", (row) => { let most = -Infinity; for (const column of bearing.force) if (row[column] > most) most = row[column]; return most; });
+    rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ${numbers.bearings[k].noun}${of}`, "N", rms(run, force));
     if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing.load, row)))));
     peak(`${id}peak_motion`, `Furthest that the rings are apart${of}`, "\u00b5m", (row) => length(motionOf(bearing, row)));
     const parts = [0, 1].map((axis) => measured(run, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));

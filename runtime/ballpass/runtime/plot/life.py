@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.ask.life_records import BearingStrength
 from ballpass.runtime.plot.style import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.plot.sweep import LUMINANCE
+from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]
@@ -42,9 +43,11 @@ def damage(title: str, bearing: BearingStrength) -> Figure:
         panel.yaxis.set_major_locator(MaxNLocator(4))
         panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
         panel.tick_params(labelsize=8)
+    element = RATED[bearing.element]
     words = (
-        f"Share of each of {len(bearing.inner.damage)} places in the damage of both raceways [%], by the third power "
-        "of the ball loads that pass it, with the exponent 10/9 of Weibull's law. Angles are in each ring's own "
+        f"Share of each of {len(bearing.inner.damage)} places in the damage of both raceways [%], by the power "
+        f"{element.life.turning} of the {element.noun} loads that pass it, with the exponent {element.life.weibull} of "
+        "Weibull's law. Angles are in each ring's own "
         "coordinates, from where its x axis was at the start. Life by sectors: "
         f"{bearing.lives['sectors'] / MILLION:.4g} million turns; governing reading: {bearing.governing}."
     )
@@ -63,19 +66,19 @@ def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, r
     """
     figure = new_figure(4.4)
     panel = figure.add_subplot()
-    balls = found.shape[1]
+    balls, element = found.shape[1], RATED[bearing.element]
     edges = np.degrees(np.append(crank, 2.0 * crank[-1] - crank[-2]))
     mesh = panel.pcolormesh(
         edges, np.arange(balls + 1) + 0.5, found.T / 1e6, cmap=LUMINANCE.reversed(), rasterized=True
     )
     figure.colorbar(mesh, ax=panel, label="peak pressure [MPa]")
-    panel.set(xlabel="angle of driver or shaft [°]", ylabel="ball", yticks=range(1, balls + 1))
+    panel.set(xlabel="angle of driver or shaft [°]", ylabel=element.noun, yticks=range(1, balls + 1))
     panel.grid(visible=False)
     words = (
-        f"Peak pressure between each ball and the {ring} ring in the first turn after the transient; dark is high. "
-        "The static limit of ISO 76 is 4200 MPa; the highest pressure of all turns is "
-        f"{bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and {bearing.outer.peak_pressure / 1e6:.0f} MPa at "
-        "the outer ring."
+        f"Peak pressure between each {element.noun} and the {ring} ring in the first turn after the transient; dark is "
+        f"high. The static limit of ISO 76 is {element.static_pressure / 1e6:.0f} MPa; the highest pressure of all "
+        f"turns is {bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and "
+        f"{bearing.outer.peak_pressure / 1e6:.0f} MPa at the outer ring."
     )
     caption(figure, f"{_titled(title, bearing)}: pressure over a turn", words)
     return figure

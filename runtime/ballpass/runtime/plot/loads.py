@@ -149,7 +149,7 @@ def ball_loads(record: Record) -> Figure:
         axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
         axes.set_yticks([0.0, _round_below(0.7 * top)])  # so low that no number touches that of the next strip
     for number, axes in enumerate(grid[:, -1], start=1):
-        axes.text(1.02, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
+        axes.text(1.02, 0.4, f"{record.noun} {number}", transform=axes.transAxes, fontsize=9, va="center")
     first = grid[-1, 0]
     first.set_xlim(float(along.min()), float(along.max()))
     if record.turns:
@@ -165,7 +165,7 @@ def ball_loads(record: Record) -> Figure:
     right = " Right: around the highest load." if closer else ""
     frame(
         figure,
-        record.title("Contact load of every ball"),
+        record.title(f"Contact load of every {record.noun}"),
         f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{right}{shaded} "
         f"{record.settings()}.",
         left=0.9,

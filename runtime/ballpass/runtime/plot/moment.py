@@ -42,7 +42,7 @@ def peak_moment(record: Record) -> Figure:
         text += f"Left: {words}" if with_bearing else words.capitalize()
     if with_bearing:
         words, _ = record.ball_force()
-        text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"
+        text += f"Bearing: {record.noun}s coloured by {words}; clearance and displacement between the rings ×{factor:g}"
         if record.bearing is not None and record.bearing.outer_ring and record.has("outer.x", "outer.y"):
             moved = 1e6 * np.hypot(*record.centres("outer")[sample])
             text += f", the outer ring itself has moved by {moved:.3g} µm"
@@ -71,7 +71,7 @@ def _moment(record: Record) -> tuple[int, str]:
     """Sample to draw, and why."""
     if record.can_draw_bearing:
         _, force = record.ball_force()
-        return int(np.argmax(np.max(force, axis=1))), "highest sample of the ball force"
+        return int(np.argmax(np.max(force, axis=1))), f"highest sample of the {record.noun} force"
     if record.has("drive_torque"):
         return int(np.argmax(np.abs(record.values("drive_torque")))), "highest sample of the drive torque"
     return 0, "start of the steady part"

@@ -66,7 +66,8 @@ def orbit(record: Record) -> Figure:
     if both:
         for axes, title in zip(panels, ("in the frame's axes", "relative to the outer ring"), strict=True):
             axes.set_title(title)
-        text += " The second path is what the balls feel; dotted: half the diametral clearance around the outer ring."
+        text += f" The second path is what the {record.noun}s feel; dotted: half the diametral clearance around the "
+        text += "outer ring."
     if record.cycle_length is not None and record.turns:
         path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
         text += f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
@@ -185,7 +186,7 @@ def spectra(record: Record) -> Figure:
     weighting = "no window" if window == "boxcar" else "Hann window"
     text = f"Amplitude, mean removed, {cycles}, {weighting}, lines {spectrum.resolution:.3g} Hz apart."
     if shaft > 0.0:
-        words = f"{crank} harmonics, {shaft:.4g} Hz", f"ball pass (BPFO) and multiples, {ball_pass:.4g} Hz"
+        words = f"{crank} harmonics, {shaft:.4g} Hz", f"{record.noun} pass (BPFO) and multiples, {ball_pass:.4g} Hz"
         legend_above(figure, [Line2D([], [], **look | {"linewidth": 1.4}) for look in (_HARMONICS, _BALL_PASS)], words)
         text += _unresolved(ball_pass, shaft, spectrum.resolution, crank)
     title = record.title("Displacement spectra")

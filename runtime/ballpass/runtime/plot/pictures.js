@@ -13,6 +13,7 @@ function use(run) {
 }
 const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
 const all = ({ values, decimals }) => { const unit = 10 ** decimals; return values.map((value) => value / unit); };
+const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
 const length = ([x, y]) => Math.hypot(x, y);
 const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
@@ -191,7 +192,7 @@ function drawBearing(bearing) {
   const long = bearing.load && 0.8 * (inside - wall) / highest(frames.map((k) => length(pair(bearing.load, k))));
   get("most").textContent = `${most.toFixed(0)} N`;
   get("magnified").textContent = `Clearance and displacement between the rings \u00d7${bearing.factor}. `
-    + `Balls coloured by ${bearing.words}${bearing.load ? "; arrow: load on the inner ring." : "."}`;
+    + `${capital(bearing.noun)}s coloured by ${bearing.words}${bearing.load ? "; arrow: load on the inner ring." : "."}`;
   get("settings").textContent = `Run: ${bearing.settings}.`;
   return (k) => {
     const moved = pair(bearing.inner, k).map((value, axis) => (axis ? -1e-6 : 1e-6) * value * bearing.factor * unit);
@@ -259,7 +260,7 @@ function writeNumbers(bearing) {
   const rows = [], both = (name, words, signals, unit) => ["x", "y"].forEach((axis, n) => rows.push([`${name}.${axis}`, `${words}, ${axis}`, signals[n], unit]));
   if (bearing) {
     const prefix = bearing.name && `${bearing.name}.`;
-    bearing.force.forEach((signal, number) => rows.push([`${prefix}ball.force ${number + 1}`, `force on ball ${number + 1}`, signal, "N"]));
+    bearing.force.forEach((signal, number) => rows.push([`${prefix}ball.force ${number + 1}`, `force on ${bearing.noun} ${number + 1}`, signal, "N"]));
     both(`${prefix}inner`, "inner ring against outer", bearing.inner, "\u00b5m");
     if (bearing.outer) both(`${prefix}outer`, "outer ring", bearing.outer, "\u00b5m");
     if (bearing.load) both(`${prefix}load`, "load on the inner ring", bearing.load, "N");
@@ -290,8 +291,8 @@ function build(number) {
   if (bearing) {
     const worst = bearing.force.map((signal) => highest(all(signal))), top = worst.indexOf(highest(worst));
     const old = before((run) => run.bearings[number]), most = old && old.force.map((signal) => highest(all(signal)));
-    moves.push(drawBearing(bearing), drawChart("Ball forces", "N", [...bearing.force.map((signal) => ({ signal, colour: "var(--bar)", wide: 0.8 })),
-      { signal: bearing.force[top], before: old && old.force[most.indexOf(highest(most))], name: `strong: ball ${top + 1}, the most loaded; faint: the others` }]));
+    moves.push(drawBearing(bearing), drawChart(`${capital(bearing.noun)} forces`, "N", [...bearing.force.map((signal) => ({ signal, colour: "var(--bar)", wide: 0.8 })),
+      { signal: bearing.force[top], before: old && old.force[most.indexOf(highest(most))], name: `strong: ${bearing.noun} ${top + 1}, the most loaded; faint: the others` }]));
     moves.push(drawChart("Inner ring against outer", "\u00b5m", [{ signal: bearing.inner[0], before: old?.inner[0], name: "solid: x" },
       { signal: bearing.inner[1], before: old?.inner[1], colour: "var(--signal)", dashes: "5 3", name: "dashed: y" }]));
   }

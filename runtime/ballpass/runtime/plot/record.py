@@ -19,6 +19,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
+from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
@@ -62,6 +63,11 @@ class Record:
         """Of a scene that has one."""
         assert self.manifest.mechanism is not None  # figures of a mechanism are drawn of such scenes only
         return self.manifest.mechanism
+
+    @property
+    def noun(self) -> str:
+        """What a rolling element of the bearing is called."""
+        return "ball" if self.bearing is None else rated_element(self.bearing).noun
 
     @property
     def t(self) -> Array:

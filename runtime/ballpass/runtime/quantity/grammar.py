@@ -184,8 +184,8 @@ def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
         )
     described = {info.name: info.description for info in manifest.quantities}
     described |= {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
-    which = "any ball" if quantity.ball is None else f"ball {quantity.ball}"
-    channel = described[quantity.channel].replace("each ball", which)
+    which = r"any \1" if quantity.ball is None else rf"\1 {quantity.ball}"
+    channel = re.sub(r"each (ball|roller)", which, described[quantity.channel])
     return f"{channel}, {kind.words or kind.name} {quantity.place}".rstrip()
 
 

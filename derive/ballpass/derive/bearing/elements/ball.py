@@ -32,6 +32,7 @@ class Ball(RollingElement):
 
     name = "ball"
     noun = "ball"
+    force_words = "Hertz force"
     exponent = sp.Rational(3, 2)
     derived: ClassVar[type[HertzContact]] = HertzContact
     given: ClassVar[type[GivenContact]] = GivenContact

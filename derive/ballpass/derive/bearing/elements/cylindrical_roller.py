@@ -82,6 +82,7 @@ class CylindricalRoller(RollingElement):
 
     name = "cylindrical-roller"
     noun = "roller"
+    force_words = "line contact force"
     exponent = sp.Rational(10, 9)
     fill = MappingProxyType({"m^1.5": "m^(10/9)", "m^0.5": "m^(1/9)"})
     derived: ClassVar[type[LineContact]] = LineContact

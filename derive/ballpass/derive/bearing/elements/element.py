@@ -49,6 +49,7 @@ class RollingElement(ABC):
     Attributes
     ----------
     name, noun : what stands in the scene file, and what one is called
+    force_words : what its elastic force is
     exponent : of the deflection in the force
     fill : texts to put for others in keys whose units depend on the exponent
     derived, given : records of ``[bearing.contact]``: the stiffness follows from geometry and material, or is a number
@@ -57,6 +58,7 @@ class RollingElement(ABC):
 
     name: ClassVar[str]
     noun: ClassVar[str]
+    force_words: ClassVar[str]
     exponent: ClassVar[sp.Rational]
     fill: ClassVar[Fill] = MappingProxyType({})
     derived: ClassVar[type[Any]]

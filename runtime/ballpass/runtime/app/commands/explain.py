@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
+from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report
 
@@ -78,13 +79,15 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
                 "rest": _rest(shares, counted) if rest else None,
             }
         )
+    noun = _noun(scene.bearings)
+    absent = [*_absent(scene), *_NEVER, *_of_drive(scene)]
     return {
         "scene": scene.name,
         "mechanism": scene.mechanism is not None,
         "title": scene.title,
         "file": str(path),
         "modelled": parts,
-        "not_modelled": [*_absent(scene), *_NEVER, *_of_drive(scene)],
+        "not_modelled": [re.sub(r"\bball(s?)\b", rf"{noun}\1", text) for text in absent],
         "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
         **said.to_json(),
@@ -107,9 +110,15 @@ def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int
     parts = {
         "load and mechanism": kernels["stage"],
         "motion of the rings": kernels["relative"] + kernels["acceleration"],
-        "ball contacts": sum(b.balls * (kernels[f"{b.prefix}ball.forces"] + around) for b in bearings),
+        f"{_noun(bearings)} contacts": sum(b.balls * (kernels[f"{b.prefix}ball.forces"] + around) for b in bearings),
     }
     return parts | {"all": sum(parts.values())}
+
+
+def _noun(bearings: Sequence[Bearing]) -> str:
+    """What the rolling elements of all bearings are called; "ball" where they differ."""
+    nouns = {RATED[bearing.element].noun for bearing in bearings}
+    return nouns.pop() if len(nouns) == 1 else "ball"
 
 
 def _of_drive(scene: Scene) -> list[str]:
@@ -170,7 +179,11 @@ def _modelled(report: dict[str, Any]) -> ReportTable:
     rows = []
     for part in report["modelled"]:
         counts, rest = part["operations"], part["rest"]
-        name = part["name"] if rest is None else f"rest: ball contacts and rings{' of all' if several else ''}"
+        name = (
+            part["name"]
+            if rest is None
+            else f"rest: {part['name'].partition(' of ')[0]} and rings{' of all' if several else ''}"
+        )
         added = rest if counts is None else counts.get("rhs", 0)
         cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
         rows.append((name, str(part["line"] or ""), part["what"], cell))

@@ -49,6 +49,7 @@ class RatedBall(RatedElement):
     noun = "ball"
     limit_words = "C_0r/22"
     contact_words = "half axes of the contact ellipse"
+    middle = "groove's centre"
     static_pressure = load_ratings.STATIC_PRESSURE
     life = life.BALLS
 

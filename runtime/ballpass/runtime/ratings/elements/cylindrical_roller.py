@@ -67,6 +67,7 @@ class RatedCylindricalRoller(RatedElement):
     noun = "roller"
     limit_words = "C_0r/8.2"
     contact_words = "half length and width of the contact"
+    middle = "roller's middle"
     static_pressure = 4.0e9
     life = ElementLife(
         basic=Fraction(10, 3),

@@ -93,6 +93,7 @@ class RatedElement(ABC):
     name : what stands in the scene file
     noun : what one is called
     limit_words, contact_words : where its fatigue load limit is from, and what `semi_axes` are of, in a table
+    middle : where wear is measured from, in a table
     static_pressure : peak pressure that leaves a dent of 1e-4 of its diameter, ISO 76 [Pa]
     life : how its life depends on its load
     """
@@ -101,6 +102,7 @@ class RatedElement(ABC):
     noun: ClassVar[str]
     limit_words: ClassVar[str]
     contact_words: ClassVar[str]
+    middle: ClassVar[str]
     static_pressure: ClassVar[float]
     life: ClassVar[ElementLife]
 
