@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 from subprocess import run
 
+import numpy as np
 from PIL import Image
 
 from ballpass.derive import generate
@@ -20,7 +21,9 @@ from ballpass.runtime import load
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.plot.gallery import draw, draw_all
 from ballpass.runtime.plot.style import write_figures
+from ballpass.runtime.questions.fit import fit
 from ballpass.runtime.questions.life import life_figures
+from ballpass.runtime.questions.question import declared
 
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -67,6 +70,19 @@ ANSWERS = {
             *("--starts", "1", "--vary", "bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log"),
         ),
         "trace",
+    ),
+    "sobol_press": (
+        (
+            *("sobol", "punching_press_tangent.toml", "--of", "peak_ball_force", "--samples", "1024"),
+            *("--vary", "bearing.clearance=5 um:20 um", "--vary", "bearing.damping.ratio=2 us:3 us"),
+            *("--vary", "mechanism.bodies.slider.mass=16 kg:17.5 kg", "--vary", "bearing.share=0.45:0.55"),
+            *("--vary", "mechanism.bodies.rod.mass=2.4 kg:2.7 kg", "--vary", "bearing.outer_ring.mass=0.5 kg:0.6 kg"),
+            *("--vary", "bearing.outer_ring.stiffness=30 MN/m:70 MN/m"),
+            *("--vary", "bearing.outer_ring.damping=300 N*s/m:700 N*s/m"),
+            *("--vary", "bearing.contact.young_modulus=200 GPa:214 GPa"),
+            *("--vary", "bearing.pitch_diameter=33.49 mm:33.51 mm"),
+        ),
+        "sobol",
     ),
 }
 
@@ -141,6 +157,20 @@ def main() -> None:
             run([ballpass, "spectrum", scene_file, "--of", "inner.ay", *words, "--out", folder], cwd=folder, check=True)
             shutil.copyfile(Path(folder) / "spectrum.png", IMAGES / f"spectrum_{name}.png")
     draw_answers()
+    draw_fit()
+
+
+def draw_fit() -> None:
+    """Differences of a fit, with the data of the how-to."""
+    model = load(generate(ROOT / "scenes" / "rotor.toml"))
+    truth = {"bearing.clearance": 7e-6, "loads.unbalance.mass": 4e-3}
+    solution = model.simulate(duration=0.1, sample_rate=5e3, parameters=truth)
+    noise = 0.05 * np.std(solution["inner.y"]) * np.random.default_rng(1).standard_normal(len(solution.t))
+    data = {"time": solution.t, "inner.y": solution["inner.y"] + noise}
+    found = model.fit(data, ["bearing.clearance=2 um:15 um", "loads.unbalance.mass=1 g:20 g:log"])
+    with tempfile.TemporaryDirectory() as folder:
+        write_figures(declared(fit).figures(model, found, {}), Path(folder), ("png",), "fit.md")
+        shutil.copyfile(Path(folder) / "residuals.png", IMAGES / "fit_residuals.png")
 
 
 def draw_answers() -> None:

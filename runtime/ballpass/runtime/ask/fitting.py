@@ -165,6 +165,42 @@ def search(
     return filled(found.x), float(found.cost), bool(found.status > 0)
 
 
+def best_of(misfit: Misfit, candidates: np.ndarray) -> np.ndarray:
+    """Counts to start from: the candidate with the least misfit, with the gains and offsets that fit it best.
+
+    Parameters
+    ----------
+    candidates : counts of the unknowns that have ranges, in order, shape (candidates, .)
+
+    Raises
+    ------
+    BallpassError
+        None of them can be run.
+    """
+    linear = misfit.linear
+    ranged = [k for k in range(len(misfit.unknowns)) if k not in linear]
+    weighted = _Weighted(misfit, np.array([np.std(record.values) for record in misfit.records]))
+    best, least = None, np.inf
+    for shares in candidates:
+        counts = np.zeros(len(misfit.unknowns))
+        counts[ranged] = shares
+        counts[[k for k in linear if misfit.unknowns[k].kind == "gain"]] = 1.0
+        left = weighted.differences(counts)
+        if not np.all(np.isfinite(left)):
+            continue
+        if len(linear):
+            columns = weighted.jacobian(counts)[:, linear]
+            change = np.linalg.lstsq(columns, -left, rcond=None)[0]
+            counts[linear] += change
+            left = left + columns @ change
+        if best is None or float(left @ left) < least:
+            best, least = counts, float(left @ left)
+    if best is None:
+        assert weighted.fault is not None
+        raise weighted.fault
+    return best
+
+
 def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callable[[float], None] | None) -> Fitted:
     """Find all unknowns, and the noise.
 

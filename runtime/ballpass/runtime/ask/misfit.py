@@ -183,13 +183,19 @@ class Misfit:
         """Numbers that are counted so, SI."""
         return np.array([one.value(float(c)) for one, c in zip(self.unknowns, counts, strict=True)])
 
-    def start(self, shares: np.ndarray) -> np.ndarray:
-        """Counts to start at, from those of the parameters; shifts and offsets are nearest to zero, gains one."""
-        counts = []
-        for one in self.unknowns[len(shares) :]:
-            share = one.range.share_of(0.0) if one.range is not None else 1.0 if one.kind == "gain" else 0.0
-            counts.append(min(max(share, 0.05), 0.95) if one.range is not None else share)
-        return np.array([*shares, *counts])
+    @property
+    def ranged(self) -> tuple[ParameterRange, ...]:
+        """Ranges of the unknowns that have one, in order."""
+        return tuple(one.range for one in self.unknowns if one.range is not None)
+
+    def shares_of(self, values: Mapping[str, float]) -> np.ndarray:
+        """Counts of the unknowns that have ranges, from values of parameters; no shift."""
+        return np.array([one.share_of(values.get(one.name, 0.0)) for one in self.ranged])
+
+    @property
+    def linear(self) -> np.ndarray:
+        """Places of the unknowns on which outputs depend linearly, gains and offsets."""
+        return np.array([k for k, one in enumerate(self.unknowns) if one.kind in ("gain", "offset")], dtype=int)
 
     def runs(self, counts: np.ndarray) -> list[tuple[Numbers, float]]:
         """Numbers and length [s] of each trial's run."""

@@ -6,7 +6,7 @@ on the seed, its class and its place in the class alone: not on other members, n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,9 @@ from ballpass.runtime.contract.parameters import unknown_name
 
 #: Streams of a member: of its parameters, and of its noise.
 PARAMETERS, NOISE = 0, 1
+
+#: Distributions whose shape parameters are values of the number itself, and may have its unit.
+ENDS = ("loguniform", "reciprocal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +94,22 @@ def shape_names(name: str) -> tuple[str, ...]:
     """
     shapes = _continuous(name).shapes
     return tuple(shapes.replace(" ", "").split(",")) if shapes else ()
+
+
+def plain_arguments(name: str, given: Collection[str]) -> tuple[str, ...]:
+    """Arguments without the number's unit, as a share of the width; those of `ENDS` are values of the number itself.
+
+    Parameters
+    ----------
+    given : names of the arguments
+
+    Raises
+    ------
+    RequestError
+        SciPy has no continuous distribution of this name.
+    """
+    shapes = shape_names(name)
+    return () if name in ENDS and "scale" not in given else shapes
 
 
 def _continuous(name: str) -> Any:

@@ -13,6 +13,7 @@ from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
 from ballpass.runtime.questions.optimize import optimize
 from ballpass.runtime.questions.sensitivity import sensitivity
+from ballpass.runtime.questions.sobol import sobol
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.questions.steady import steady
 
@@ -27,6 +28,7 @@ class Questions:
     linearize = linearize
     optimize = optimize
     sensitivity = sensitivity
+    sobol = sobol
     spectrum = spectrum
     steady = steady
 

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 #: Distance of each start from the bounds, in shares of the range [1].
 INSIDE = 0.05
 
+#: Candidates of which each start is the best; the scene's values are the first.
+CANDIDATES = 8
+
 #: Tolerance of the runs where none is given [1].
 DEFAULT_RTOL = 1e-9
 
@@ -79,7 +82,13 @@ Loss = Annotated[
     ),
 ]
 FitStarts = Annotated[
-    int, Option(words="Starts: the scene's values, and others within the bounds.", shown="N", least=1, most=100)
+    int,
+    Option(
+        words="Starts, each the best of eight candidates; the scene's values are the first.",
+        shown="N",
+        least=1,
+        most=100,
+    ),
 ]
 Profile = Annotated[
     bool,
@@ -171,6 +180,7 @@ class Fit(ShortRepr, Reported):
     undetermined : groups of numbers that the data do not determine
     signals : measured and fitted
     starts : values of the parameters where each search began, and the misfit where it ended
+    rivals : values of the parameters of other searches that fit as well within the noise
     loss, profile, rtol : as asked for
     converged : whether the best search ended by itself
 
@@ -189,6 +199,7 @@ class Fit(ShortRepr, Reported):
     undetermined: tuple[UndeterminedGroup, ...]
     signals: tuple[FittedSignal, ...]
     starts: tuple[tuple[tuple[float, ...], float], ...]
+    rivals: tuple[tuple[float, ...], ...]
     loss: str
     profile: bool
     rtol: float
@@ -223,7 +234,14 @@ class Fit(ShortRepr, Reported):
         if len(self.starts) > 1:
             ends = ", ".join(f"{end:.6g}" for _, end in self.starts)
             said.append(f"{len(self.starts)} starts ended at mean squares of differences over noise of {ends}")
-        warned = [
+        warned = []
+        if self.rivals:
+            told = "; ".join(", ".join(f"{value:.6g}" for value in rival) for rival in self.rivals)
+            warned.append(
+                f"Other values fit as well within the noise, SI: {told}. The intervals do not reach to them. Give "
+                "narrower bounds, more data, or a part of the record that depends less on its start."
+            )
+        warned += [
             f"{one.name}: each difference is correlated with the next one ({one.correlation:.2f}). Intervals hold for "
             "white noise: the model leaves something out, or the noise is filtered. They are too narrow then."
             for one in self.signals
@@ -244,6 +262,7 @@ class Fit(ShortRepr, Reported):
                 for one in self.signals
             ],
             "starts": [{"start": list(start), "end": end} for start, end in self.starts],
+            "rivals": [list(one) for one in self.rivals],
             "loss": self.loss,
             "profile": self.profile,
             "rtol": self.rtol,
@@ -292,7 +311,7 @@ def fit(
     offset: Offset = False,
     loss: Loss = "linear",
     profile: Profile = False,
-    starts: FitStarts = 1,
+    starts: FitStarts = 3,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     progress: Progress = None,
@@ -325,7 +344,7 @@ def fit(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.fitting import fit_unknowns
+    from ballpass.runtime.ask.fitting import best_of, fit_unknowns
     from ballpass.runtime.ask.measured import read_columns, read_trial
     from ballpass.runtime.ask.misfit import Misfit
     from ballpass.runtime.ask.parameter_range import parameter_range
@@ -348,14 +367,14 @@ def fit(
         parameters=dict(parameters or {}),
         rtol=tolerance,
     )
-    scene = model.numbers(parameters).parameters
-    first = np.clip([one.share_of(scene[one.name]) for one in ranges], INSIDE, 1.0 - INSIDE)
-    others = INSIDE + (1.0 - 2.0 * INSIDE) * Halton(len(ranges), scramble=False).random(starts)[1:]
+    shares = Halton(len(misfit.ranged), scramble=False).random(CANDIDATES * starts)
+    shares[0] = misfit.shares_of(model.numbers(parameters).parameters)  # in place of a corner
+    shares = np.clip(shares, INSIDE, 1.0 - INSIDE)
     found = []
     with shown("fitting", progress) as tell:
-        for k, shares in enumerate([first, *others]):
-            begun = misfit.start(shares)
-            told = None if tell is None else lambda done, k=k: tell((k + done) / starts)  # type: ignore[misc]
+        for k in range(starts):
+            begun = best_of(misfit, shares[CANDIDATES * k : CANDIDATES * (k + 1)])
+            told = None if tell is None else lambda done, k=k: tell((k + done) / starts)
             found.append((begun, fit_unknowns(misfit, begun, loss, told)))
         # all in the noise of the best, for their noises differ
         best = min((one for _, one in found), key=lambda one: float(np.sum(np.log(one.noise))))
@@ -458,11 +477,22 @@ def _answer(
             )
             for begun, one in found
         ),
+        rivals=tuple(
+            tuple(misfit.values(one.counts)[:parts].tolist()) for _, one in found if _is_rival(misfit, best, one)
+        ),
         loss=loss,
         profile=profile,
         rtol=rtol,
         converged=best.converged,
     )
+
+
+def _is_rival(misfit: Misfit, best: Fitted, other: Fitted) -> bool:
+    """Whether another search ended elsewhere, and as well within the noise."""
+    samples = np.array([len(record.values) for record in misfit.records])
+    worse = 2.0 * float(samples @ np.log(other.noise / best.noise))
+    away = np.abs(other.counts - best.counts) > best.spread * np.sqrt(np.diag(best.covariance))
+    return worse < best.spread**2 and bool(np.any(away & (np.array(best.held) == "")))
 
 
 def _correlation(differences: np.ndarray) -> float:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
-from ballpass.runtime.many.distributions import Distribution, shape_names
+from ballpass.runtime.many.distributions import Distribution, plain_arguments
 from ballpass.runtime.many.signals import PRECISIONS, Signals
 from ballpass.runtime.run.sensor import Sensor, read_sensor
 
@@ -32,9 +32,6 @@ LARGEST_SPEC = 10_000_000
 
 #: Most members of a class.
 MOST_MEMBERS = 10_000_000
-
-#: Distributions whose shape parameters are values of the number itself, and may have its unit.
-_ENDS = ("loguniform", "reciprocal")
 
 _EXAMPLE = '{ distribution = "uniform", loc = "5 um", scale = "10 um" }'
 
@@ -230,9 +227,7 @@ def _read_value(table: Table, key: str, written: Any, unit: str) -> Distribution
         table.fault(key, problem, given=repr(written), allowed=_EXAMPLE, remedy='add distribution = "uniform"')
         return None
     try:
-        shapes = shape_names(name)
-        # a share of the width, an exponent, ... is a plain number; ends have the unit of the number
-        plain = () if name in _ENDS and "scale" not in rest else shapes
+        plain = plain_arguments(name, rest)
         before = len(table.collector.faults)
         arguments = {
             word: table.collector.quantity((*path, word), value, "1" if word in plain else unit, "", "").value

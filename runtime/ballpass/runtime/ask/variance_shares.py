@@ -1,0 +1,91 @@
+"""Shares of the inputs in the variance of a result (Sobol' indices), and shares of members within limits.
+
+In: results of members, NaN for those without.  Out: `VarianceShare`, intervals.
+
+Base members have inputs A and B, drawn independently; further ones have those of A but for one input, which is that of
+B.  The estimators are those of Saltelli et al. 2010, as in `scipy.stats.sobol_indices`, which takes no failed members.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Resamples of a bootstrap.
+RESAMPLES = 500
+
+#: 95 % of a normal distribution lie within so many deviations.
+NORMAL = 1.959964
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VarianceShare:
+    """Shares of one input in the variance of a result.
+
+    Attributes
+    ----------
+    first, first_low, first_high : what the variance would lose on average if the input were known, and 95 % interval
+    total, total_low, total_high : what is left of it if all others were known
+    rows : base members of which all three needed members had results
+    """
+
+    first: float
+    first_low: float
+    first_high: float
+    total: float
+    total_low: float
+    total_high: float
+    rows: int
+
+
+def variance_shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray, seed: int) -> tuple[VarianceShare, ...]:
+    """Shares of all inputs.
+
+    A failed member takes the two that it is compared with along, and no others.
+
+    Parameters
+    ----------
+    a, b : results with inputs A and B, shape (rows,)
+    mixed : with A but for one input, shape (inputs, rows)
+    seed : of the bootstrap
+    """
+    random = np.random.default_rng(seed)
+    found = []
+    for one in mixed:
+        known = np.isfinite(a) & np.isfinite(b) & np.isfinite(one)
+        rows = int(np.count_nonzero(known))
+        if rows < 2:
+            found.append(VarianceShare(**dict.fromkeys(_NUMBERS, math.nan), rows=rows))
+            continue
+        parts = np.stack([a[known], b[known], one[known]])
+        draws = random.integers(0, rows, (RESAMPLES, rows))
+        again = np.array([_shares(parts[:, draw]) for draw in draws])
+        low, high = np.nanpercentile(again, (2.5, 97.5), axis=0).tolist()
+        first, total = _shares(parts)
+        values = (first, low[0], high[0], total, low[1], high[1])
+        found.append(VarianceShare(**dict(zip(_NUMBERS, values, strict=True)), rows=rows))
+    return tuple(found)
+
+
+_NUMBERS = ("first", "first_low", "first_high", "total", "total_low", "total_high")
+
+
+def _shares(parts: np.ndarray) -> tuple[float, float]:
+    """First and total share from results with A, with B and with A but for one input, shape (3, rows)."""
+    a, b, one = parts - np.mean(parts[:2])
+    variance = np.var(parts[:2])
+    if variance == 0.0:
+        return math.nan, math.nan
+    return float(np.mean(b * (one - a)) / variance), float(0.5 * np.mean((a - one) ** 2) / variance)
+
+
+def wilson(hits: int, members: int) -> tuple[float, float]:
+    """95 % interval of a share by Wilson (1927), from independent members."""
+    if not members:
+        return 0.0, 1.0
+    share, z = hits / members, NORMAL**2 / members
+    middle = share + 0.5 * z
+    half = math.sqrt(z * (share * (1.0 - share) + 0.25 * z))
+    return max(0.0, (middle - half) / (1.0 + z)), min(1.0, (middle + half) / (1.0 + z))

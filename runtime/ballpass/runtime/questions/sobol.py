@@ -1,0 +1,346 @@
+"""Which tolerances matter: shares of the inputs in the variance of quantities, and how many members keep limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.questions.optimize import Limits, read_limit
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.variance_shares import VarianceShare
+    from ballpass.runtime.many.distributions import Distribution
+
+#: Most members.
+MOST = 10_000_000
+
+#: Quantiles in the report.
+QUANTILES = (0.05, 0.5, 0.95)
+
+Of = Annotated[str | Sequence[str] | None, Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q")]
+Spread = Annotated[
+    str | Sequence[str],
+    Option(
+        words="Parameter and its distribution: `A:B` (uniform), `A:B:log`, or one of SciPy. May be repeated.",
+        shown="PATH=DISTRIBUTION",
+        example='bearing.clearance="norm:loc=10 um:scale=1 um"',
+    ),
+]
+Samples = Annotated[
+    int,
+    Option(words="Base samples N, a power of two; there are N (inputs + 2) members.", shown="N", least=16, most=2**20),
+]
+WithIndices = Annotated[
+    bool,
+    Option(
+        words="Compute the inputs' shares; without them there are N members, for limits and quantiles.",
+        flags=("--indices/--no-indices",),
+    ),
+]
+Seed = Annotated[int, Option(words="Seed of all random numbers.", shown="N", least=0, most=2**31)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptLimit:
+    """How many members keep a limit.
+
+    Attributes
+    ----------
+    words : the limit
+    kept, members : members that keep it, and all that have a result
+    share, low, high : their ratio, and its 95 % interval by Wilson
+    """
+
+    words: str
+    kept: int
+    members: int
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpreadQuantity:
+    """A quantity over the inputs.
+
+    Attributes
+    ----------
+    name, unit : of the quantity
+    mean, deviation, least, most : over the base members
+    quantiles : at 5, 50 and 95 %
+    shares : of the inputs in its variance, in their order; empty where none were asked for
+    """
+
+    name: str
+    unit: str
+    mean: float
+    deviation: float
+    least: float
+    most: float
+    quantiles: tuple[float, ...]
+    shares: tuple[VarianceShare, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class SobolAnswer(ShortRepr, Reported):
+    """Quantities over uncertain inputs.
+
+    Attributes
+    ----------
+    inputs : parameters that vary
+    distributions : of the inputs, in words
+    quantities : spread and shares of each
+    limits : how many members keep each
+    samples, seed, members : base samples, seed, members in all
+    failed : members without results, and `fault` of the first
+    base : values of the inputs of the base members, shape (base members, inputs)
+    values : of the quantities there, NaN for members without results, shape (base members, quantities)
+
+    Examples
+    --------
+    >>> vary = ["bearing.clearance=5 um:15 um", "mechanism.bodies.slider.mass=16 kg:17 kg"]
+    >>> found = model.sobol(vary, "peak_ball_force", cycles=3, samples=32)
+    >>> found.members, found.quantities[0].shares[0].total > 0.9
+    (128, True)
+    """
+
+    inputs: tuple[str, ...]
+    distributions: tuple[str, ...]
+    quantities: tuple[SpreadQuantity, ...]
+    limits: tuple[KeptLimit, ...]
+    samples: int
+    seed: int
+    members: int
+    failed: int
+    fault: str
+    base: np.ndarray
+    values: np.ndarray
+
+    def _report(self) -> Report:
+        from ballpass.runtime.ask.variance_shares import wilson
+
+        parts: list[Any] = []
+        rows = [
+            (one.name, *(f"{v:.5g}" for v in (one.mean, one.deviation, *one.quantiles, one.least, one.most)), one.unit)
+            for one in self.quantities
+        ]
+        right = ("mean", "deviation", "5 %", "50 %", "95 %", "least", "most")
+        heads = ("quantity", *right, "unit")
+        parts.append(ReportTable(title=f"{self.members} members", heads=heads, rows=rows, right=right))
+        records = []
+        for one in self.quantities:
+            ranked = sorted(zip(self.inputs, one.shares, strict=False), key=lambda pair: -pair[1].total)
+            shares = ("total share", "first-order share")
+            cells = [
+                (name, _interval(s.total, s.total_low, s.total_high), _interval(s.first, s.first_low, s.first_high))
+                for name, s in ranked
+            ]
+            if ranked:
+                title = f"Shares in the variance of {one.name}, with 95 % intervals"
+                parts.append(ReportTable(title=title, heads=("input", *shares), rows=cells))
+            records += [{"quantity": one.name, "input": name, **asdict(s)} for name, s in ranked]
+        for limit in self.limits:
+            parts.append(
+                f"P({limit.words}) = {limit.share:.4g}, 95 % interval {limit.low:.4g} to {limit.high:.4g}: "
+                f"{limit.kept} of {limit.members}"
+            )
+        warned = []
+        if self.failed:
+            low, high = wilson(self.failed, self.members)
+            warned.append(
+                f"{self.failed} of {self.members} members have no result ({100.0 * low:.2g} to {100.0 * high:.2g} %). "
+                "They were left out with those that they are compared with: all numbers are of inputs that can be "
+                f"simulated. The first: {self.fault}"
+            )
+        facts = {
+            "inputs": list(self.inputs),
+            "distributions": list(self.distributions),
+            "quantities": [asdict(one) for one in self.quantities],
+            "limits": [asdict(one) for one in self.limits],
+            "samples": self.samples,
+            "seed": self.seed,
+            "members": self.members,
+            "failed": self.failed,
+            "first_fault": self.fault,
+        }
+        fault = "" if self.failed < self.members else "No member has a result."
+        return Report(
+            parts=tuple(parts),
+            facts=facts,
+            records=records,
+            index=("quantity", "input"),
+            warnings=warned,
+            fault=fault,
+        )
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    return f"{value:6.3f}  ({low:.3f} to {high:.3f})"
+
+
+def _figures(_model: AnyModel, found: SobolAnswer, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.shares import draw_shares
+
+    for k, one in enumerate(found.quantities):
+        name = "sobol" if k == 0 else f"sobol_{k + 1}"
+        yield name, draw_shares(one.name, one.unit, found.inputs, one.shares, found.values[:, k])
+
+
+def _check(values: Mapping[str, Any]) -> None:
+    need("scipy")
+    samples = values["samples"]
+    if samples & (samples - 1):
+        near = 2 ** round(math.log2(samples))
+        raise RequestError(f"samples: {samples} is no power of two. Allowed: 16, 32, 64, ... Give {near}.")
+    if not values["of"] and not values["limit"]:
+        raise RequestError('of: no quantity was named. Give one (--of), or a limit of one (--limit "Q <= VALUE").')
+
+
+@Question(stage="simulate", figures=_figures, check=_check)
+def sobol(
+    model: AnyModel,
+    vary: Spread,
+    of: Of = None,
+    cycles: Cycles = None,
+    *,
+    limit: Limits = None,
+    samples: Samples = 256,
+    indices: WithIndices = True,
+    seed: Seed = 1,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    progress: Progress = None,
+) -> SobolAnswer:
+    """Find which uncertain inputs make a quantity vary, and how many members keep limits.
+
+    Members are drawn from the distributions of the inputs, as points of a scrambled Sobol' sequence, and run in lanes.
+    A member without a result is left out with those that it is compared with, and counted.
+
+    Parameters
+    ----------
+    parameters : overrides of other parameters, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        Unknown names, wrong distributions or limits.
+
+    Examples
+    --------
+    >>> clearance = "bearing.clearance=norm:loc=10 um:scale=1 um"
+    >>> limit = "peak_ball_force <= 4.4 kN"
+    >>> found = model.sobol(clearance, limit=limit, cycles=3, samples=64, indices=False)
+    >>> found.members, 0.4 < found.limits[0].share < 0.7
+    (64, True)
+    """
+    from scipy.stats.qmc import Sobol
+
+    from ballpass.runtime.ask.parameter_distribution import parameter_distribution
+    from ballpass.runtime.ask.variance_shares import variance_shares, wilson
+    from ballpass.runtime.many.ensemble import simulate_many
+    from ballpass.runtime.quantity.grammar import quantities_of
+
+    texts = [vary] if isinstance(vary, str) else list(vary)
+    pairs = [parameter_distribution(model.manifest, "vary", text) for text in texts]
+    inputs = tuple(name for name, _ in pairs)
+    if not inputs or len(set(inputs)) < len(inputs):
+        raise RequestError(f"vary: one parameter or more is expected, each once, not {list(inputs)!r}.")
+    limits = [read_limit(model, text) for text in ([limit] if isinstance(limit, str) else list(limit or []))]
+    names = [of] if isinstance(of, str) else list(of or [])
+    names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
+    units = [one.unit for one in quantities_of(model, names)]
+    count = len(inputs)
+    if samples * (count + 2) > MOST:
+        raise RequestError(f"samples: {samples * (count + 2)} members. Allowed: {MOST}. Give fewer samples.")
+    drawn = Sobol(2 * count, scramble=True, seed=np.random.default_rng(seed)).random(samples)
+    a, b = (_inputs(pairs, part) for part in (drawn[:, :count], drawn[:, count:]))
+    rows = [a]
+    if indices:
+        rows.append(b)
+        for k in range(count):
+            rows.append(a.copy())
+            rows[-1][:, k] = b[:, k]
+    every = np.concatenate(rows)
+    table = {name: np.full(len(every), value) for name, value in (parameters or {}).items()}
+    with shown("simulating", progress) as tell:
+        found = simulate_many(
+            model,
+            table | dict(zip(inputs, every.T, strict=True)),
+            names,
+            cycles=cycles,
+            duration=None,
+            transient=transient,
+            rtol=None,
+            method=None,
+            kinks=None,
+            threads=None,
+            lanes=True,
+            progress=tell,
+        )
+    if found.interrupted:
+        raise KeyboardInterrupt
+    values = np.array([found[name] for name in names]).T
+    base = values[: 2 * samples] if indices else values
+    quantities = []
+    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
+        known = base[np.isfinite(base[:, k]), k]
+        known = known if len(known) else np.array([math.nan])
+        blocks = values[:, k].reshape(-1, samples)
+        quantities.append(
+            SpreadQuantity(
+                name=name,
+                unit=unit,
+                mean=float(np.mean(known)),
+                deviation=float(np.std(known)),
+                least=float(np.min(known)),
+                most=float(np.max(known)),
+                quantiles=tuple(np.quantile(known, QUANTILES).tolist()),
+                shares=variance_shares(blocks[0], blocks[1], blocks[2:], seed) if indices else (),
+            )
+        )
+    kept = []
+    for one in limits:
+        column = base[:, names.index(one.quantity)]
+        known = column[np.isfinite(column)]
+        hits = int(np.count_nonzero(known <= one.limit if one.upper else known >= one.limit))
+        low, high = wilson(hits, len(known))
+        words = f"{one.quantity} {'<=' if one.upper else '>='} {one.limit:g} {one.unit}"
+        share = hits / len(known) if len(known) else math.nan
+        kept.append(KeptLimit(words=words, kept=hits, members=len(known), share=share, low=low, high=high))
+    return SobolAnswer(
+        inputs=inputs,
+        distributions=tuple(_words(one) for _, one in pairs),
+        quantities=tuple(quantities),
+        limits=tuple(kept),
+        samples=samples,
+        seed=seed,
+        members=len(every),
+        failed=len(found.failures),
+        fault=found.failures[0].message if found.failures else "",
+        base=np.concatenate(rows[:2]),
+        values=base,
+    )
+
+
+def _inputs(pairs: Sequence[tuple[str, Distribution]], shares: np.ndarray) -> np.ndarray:
+    """Values of the inputs from shares of smaller ones, shape (samples, inputs)."""
+    return np.stack([one.values(share) for (_, one), share in zip(pairs, shares.T, strict=True)], axis=1)
+
+
+def _words(one: Distribution) -> str:
+    return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"

@@ -1,0 +1,160 @@
+"""Shares of inputs in a variance: a closed form through the same code, failed members, yield against a sweep."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.stats import norm, sobol_indices, uniform
+from scipy.stats.qmc import Sobol
+
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.ask.variance_shares import VarianceShare, variance_shares, wilson
+
+CLEARANCE = "bearing.clearance"
+
+
+def _ishigami(x: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sin(x[0]) + 7.0 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0]))
+
+
+#: Ishigami and Homma 1990: first-order and total shares with constants 7 and 0.1.
+FIRST, TOTAL = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)
+
+
+def _members(samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    points = np.pi * (2.0 * Sobol(6, seed=np.random.default_rng(3)).random(samples).T - 1.0)
+    a, b = points[:3], points[3:]
+    mixed = []
+    for k in range(3):
+        both = a.copy()
+        both[k] = b[k]
+        mixed.append(_ishigami(both))
+    return _ishigami(a), _ishigami(b), np.array(mixed)
+
+
+def _check(found: tuple[VarianceShare, ...], tolerance: float) -> None:
+    for one, first, total in zip(found, FIRST, TOTAL, strict=True):
+        assert one.first == pytest.approx(first, abs=tolerance)
+        assert one.total == pytest.approx(total, abs=tolerance)
+        assert one.first_low < first < one.first_high
+        assert one.total_low < total < one.total_high
+
+
+def test_shares_of_the_ishigami_function() -> None:
+    _check(variance_shares(*_members(2**14), seed=1), 0.01)
+
+
+def test_one_member_in_twenty_without_a_result_spoils_nothing() -> None:
+    a, b, mixed = _members(2**14)
+    random = np.random.default_rng(1)
+    for part in (a, b, mixed):
+        part[random.random(part.shape) < 0.05] = np.nan
+    found = variance_shares(a, b, mixed, seed=1)
+    _check(found, 0.03)
+    assert found[0].rows == pytest.approx(0.95**3 * 2**14, rel=0.01)
+
+
+def test_the_estimates_are_those_of_scipy() -> None:
+    a, b, mixed = _members(2**10)
+    given = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
+    theirs = sobol_indices(func=given, n=2**10, dists=[uniform()] * 3)
+    ours = variance_shares(a, b, mixed, seed=1)
+    assert [one.first for one in ours] == pytest.approx(theirs.first_order.ravel().tolist(), rel=1e-9)
+    assert [one.total for one in ours] == pytest.approx(theirs.total_order.ravel().tolist(), rel=1e-9)
+
+
+def test_wilson_covers_the_share_in_95_percent_of_samples() -> None:
+    hits = np.random.default_rng(1).binomial(80, 0.03, 4000)
+    inside = [low <= 0.03 <= high for low, high in (wilson(int(one), 80) for one in hits)]
+    assert 0.93 < np.mean(inside) < 0.985
+    assert wilson(0, 10)[0] == 0.0
+    assert wilson(0, 10)[1] == pytest.approx(0.2775, abs=1e-4)  # a printed table
+
+
+def test_failed_members_of_a_scene_leave_the_shares_as_they_are(make_model: Callable[..., Model]) -> None:
+    """The crank's inertia acts nowhere; one in twenty is drawn below zero, which is refused."""
+    press = make_model("punching_press_tangent")
+    vary = [f"{CLEARANCE}=5 um:20 um", "bearing.outer_ring.stiffness=30 MN/m:80 MN/m"]
+    inertia = "mechanism.bodies.crank.inertia=norm:loc=1.645 kg*m^2:scale=1 kg*m^2"
+    plain = press.sobol(vary, "peak_ball_force", cycles=2, transient=1, samples=128, progress=False)
+    spoiled = press.sobol([*vary, inertia], "peak_ball_force", cycles=2, transient=1, samples=128, progress=False)
+    assert spoiled.failed == pytest.approx(0.05 * spoiled.members, rel=0.4)
+    assert "have no result" in spoiled.report().warnings[0]
+    for one, other in zip(plain.quantities[0].shares, spoiled.quantities[0].shares, strict=False):
+        assert other.total_low < one.total < other.total_high
+        assert other.first_low < one.first < other.first_high
+    assert spoiled.quantities[0].shares[2].total == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_yield_is_the_share_of_a_fine_sweep_that_keeps_the_limit(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press_tangent")
+    found = press.sobol(
+        f"{CLEARANCE}=norm:loc=12 um:scale=3 um",
+        limit="peak_ball_force <= 5.7 kN",
+        cycles=2,
+        transient=1,
+        samples=256,
+        indices=False,
+        progress=False,
+    )
+    table = {CLEARANCE: norm(12e-6, 3e-6).ppf((np.arange(2000) + 0.5) / 2000)}
+    swept = press.simulate_many(table, "peak_ball_force", cycles=2, transient=1)["peak_ball_force"]
+    (one,) = found.limits
+    assert one.low < np.mean(swept <= 5700.0) < one.high
+    assert 0.02 < one.share < 0.98
+    assert one.high - one.low < 0.13
+
+
+@pytest.mark.long
+def test_peak_force_of_the_press_over_ten_parameters_takes_less_than_two_minutes(
+    make_model: Callable[..., Model],
+) -> None:
+    """N = 1024, so that there are 12288 members, on two processors."""
+    press = make_model("punching_press")
+    names = [
+        "mechanism.bodies.slider.mass",
+        "mechanism.bodies.rod.mass",
+        "bearing.outer_ring.stiffness",
+        "bearing.outer_ring.damping",
+        "bearing.outer_ring.mass",
+        "bearing.pitch_diameter",
+        "bearing.contact.young_modulus",
+        "bearing.damping.ratio",
+        "bearing.share",
+    ]
+    vary = [f"{CLEARANCE}=5 um:15 um"]
+    for name in names:
+        info = next(one for one in press.manifest.parameters if one.name == name)
+        width = 1e-3 if name == "bearing.pitch_diameter" else 0.05
+        low, high = (
+            f"{value:.9g} {info.unit}" if info.unit != "1" else f"{value:.9g}"
+            for value in (info.default * (1 - width), info.default * (1 + width))
+        )
+        vary.append(f"{name}={low}:{high}")
+    begin = time.process_time()
+    found = press.sobol(vary, "peak_ball_force", samples=1024, progress=False)
+    assert time.process_time() - begin < 2 * 120.0
+    assert found.members == 12288
+    assert found.failed == 0
+    shares = found.quantities[0].shares
+    assert sum(one.first for one in shares) == pytest.approx(1.0, abs=0.2)
+    assert all(one.total_high - one.total_low < 0.2 for one in shares)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"of": "rms:inner.y", "samples": 100}, "no power of two"),
+        ({}, "no quantity was named"),
+        ({"of": "rms:inner.y", "vary": f"{CLEARANCE}=normal:loc=1 um"}, "no continuous distribution|normal"),
+        ({"of": "rms:inner.y", "vary": f"{CLEARANCE}=norm:loc=1 N"}, CLEARANCE),
+        ({"of": "rms:inner.y", "vary": f"{CLEARANCE}=norm:scale=-1 um"}, "domain"),
+        ({"of": "rms:inner.y", "vary": [f"{CLEARANCE}=1 um:2 um"] * 2}, "each once"),
+    ],
+)
+def test_wrong_requests_are_refused(make_model: Callable[..., Model], options: dict[str, object], words: str) -> None:
+    with pytest.raises(RequestError, match=words):
+        make_model("punching_press_tangent").sobol(**{"vary": f"{CLEARANCE}=1 um:2 um", **options})
