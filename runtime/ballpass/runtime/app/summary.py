@@ -28,6 +28,7 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
+from ballpass.runtime.native.reduction_rows import why_void
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
@@ -51,8 +52,8 @@ _TOOLS = ("casadi", "numpy", "scipy")
 #: The ball forces of a bearing whose peaks are reported, by their key.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 
-#: Largest usual deflection of a ball over its diameter, and the largest that is a deflection at all [1].
-MOST_DEFLECTION, FLATTENED = 0.01, 0.1
+#: Largest usual deflection of a ball over its diameter [1].
+MOST_DEFLECTION = 0.01
 
 #: Numbers that `add_turns` names; the file has all.
 SHOWN = 5
@@ -141,16 +142,9 @@ def _unusual(sol: Solution) -> list[str]:
         apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
         displacement = float(np.max(apart))
         deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
-        if deflection > FLATTENED * ball or displacement > ball:
-            what = (
-                f"a {noun} is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
-                if deflection > FLATTENED * ball
-                else f"the rings are displaced by {1e3 * displacement:.4g} mm, more than a {noun}'s diameter"
-            )
-            raise SimulationError(
-                f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
-                "clearance, give more damping, or check stiffness, masses and their units."
-            )
+        void = why_void(bearing, known, deflection, displacement)
+        if void:
+            raise SimulationError(void)
         if deflection > MOST_DEFLECTION * ball:
             said.append(
                 f"{bearing.path}: a {noun} is deflected by {1e6 * deflection:.4g} um, "

@@ -84,5 +84,6 @@ def _start_words(model: Model, longer: Settled) -> str:
     return (
         f"extremes of the start, not of the steady machine: {words} ({names[0]}) has its {kind} of "
         f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. "
-        "Drop more turns (--transient), start at rest (--initial equilibrium), or let the run find its transient (--turns settle)."
+        "Drop more turns (--transient), start at rest (--initial equilibrium), or let the run find its transient "
+        "(--turns settle)."
     )

@@ -105,7 +105,8 @@ def _bearing(
     peak = history.peaks[info.prefix]
     force, nominal = max(peak.maximum, 0.0), float(geometry_of(info, values).nominal_cosine)
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
-    why = why_no_life(info, moving, driver_angle.shaft_speed(manifest, moving))
+    turning = driver_angle.shaft_speed(manifest, moving)
+    why = why_no_life(info, moving, turning)
     speed = 0.0 if why else math.copysign(history.speeds[info.prefix], moving[info.ring_speed])
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
@@ -141,7 +142,7 @@ def _bearing(
     return replace(
         strength,
         beyond=(*limits_of(info, values, strength), *filter(None, (tilt.beyond,))),
-        oscillation=_oscillation(info, values, ratings, samples, load, force) if why and initial else None,
+        oscillation=_oscillation(info, values, ratings, samples, load, force) if why and turning else None,
         tilt=tilt,
     )
 

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import BearingInfo
+from ballpass.runtime.ratings.of_bearing import rated_element
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -107,34 +109,47 @@ def is_void(manifest: Manifest, values: Mapping[str, ArrayLike], rows: Array) ->
     A ball is flattened by more than a tenth, or the rings are displaced by more than a ball.
     """
     void = np.zeros(len(rows), dtype=bool)
-    for path, deflection in _deflections(manifest, rows):
-        ball, clearance = (np.asarray(values[f"{path}.{key}"]) for key in ("ball_diameter", "clearance"))
+    for bearing, deflection in _deflections(manifest, rows):
+        ball, clearance = (np.asarray(values[f"{bearing.path}.{key}"]) for key in ("ball_diameter", "clearance"))
         void |= (deflection > FLATTENED * ball) | (deflection + clearance / 2.0 > ball)
     return void
 
 
 def void_words(manifest: Manifest, values: Mapping[str, float], row: Array) -> str:
     """Why a run means nothing; empty where it is not void."""
-    for path, (deflection,) in _deflections(manifest, row[None, :]):
-        ball, displaced = values[f"{path}.ball_diameter"], deflection + values[f"{path}.clearance"] / 2.0
-        if deflection > FLATTENED * ball or displaced > ball:
-            what = (
-                f"a ball is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
-                if deflection > FLATTENED * ball
-                else f"the rings are displaced by {1e3 * displaced:.4g} mm, more than a ball's diameter"
-            )
-            return (
-                f"{path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
-                "clearance, give more damping, or check stiffness, masses and their units."
-            )
+    for bearing, (deflection,) in _deflections(manifest, row[None, :]):
+        words = why_void(bearing, values, deflection, deflection + values[f"{bearing.path}.clearance"] / 2.0)
+        if words:
+            return words
     return ""
 
 
-def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[str, Array]]:
-    """Of each bearing, by its path: largest deflection of a ball in each run [m]."""
+def why_void(bearing: BearingInfo, values: Mapping[str, float], deflection: float, displaced: float) -> str:
+    """Why no bearing can be so; empty where one can.
+
+    Parameters
+    ----------
+    deflection, displaced : largest of a ball, and largest displacement of the rings [m]
+    """
+    ball, noun = values[f"{bearing.path}.ball_diameter"], rated_element(bearing).noun
+    if deflection <= FLATTENED * ball and displaced <= ball:
+        return ""
+    what = (
+        f"a {noun} is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
+        if deflection > FLATTENED * ball
+        else f"the rings are displaced by {1e3 * displaced:.4g} mm, more than a {noun}'s diameter"
+    )
+    return (
+        f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
+        "clearance, give more damping, or check stiffness, masses and their units."
+    )
+
+
+def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo, Array]]:
+    """Of each bearing: largest deflection of a ball in each run [m]."""
     layout = reduction_rows(manifest)
     for bearing in manifest.bearings:
-        yield bearing.path, rows[:, layout.column("max", bearing.prefix + DEFLECTION)]
+        yield bearing, rows[:, layout.column("max", bearing.prefix + DEFLECTION)]
 
 
 def moments_of(shift: Array, integral: Array, square: Array, duration: Array) -> tuple[Array, Array]:
