@@ -167,7 +167,7 @@ def test_life_combines_radial_and_axial_load(angled: Model) -> None:
         "loads.weight.force.y": -500.0,
         "loads.unbalance.mass": 0.0,
     }
-    found = angled.life(parameters=numbers).states[0].bearings[0]
+    found = angled.life(parameters=numbers, cycles=8, transient=6).states[0].bearings[0]
     static = angled.simulate(parameters=numbers, cycles=8, transient=6)
     total = np.mean(np.sum(np.atleast_2d(static["ball.force"]), axis=1))
     x, y, e = life.axial_factors(math.radians(8.0), deep_groove=True)

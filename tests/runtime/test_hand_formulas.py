@@ -69,17 +69,17 @@ def test_slope_of_the_shaft_is_that_of_the_bent_beam() -> None:
 
 def test_a_tilt_beyond_the_clearance_is_a_warning(make_model: Callable[..., Model]) -> None:
     free = free_tilt(BALL, PITCH, GROOVES, 5e-6) / ARCMIN
-    silent = make_model("rotor").life()
+    silent = make_model("rotor").life(cycles=3, transient=2)
     words = f"Misalignment and bending of the shaft are in no number here; the clearance leaves {free:.3g} arcmin free."
     assert words in " ".join(str(silent).split())
     assert not any("tilted" in words for words in silent.beyond)
     shaft = 'span = "200 mm"\nshaft_diameter = "20 mm"\n'
-    within = make_model("rotor", ("[bearing.damping]", ALIGNED.format("2 arcmin", shaft))).life()
+    within = make_model("rotor", ("[bearing.damping]", ALIGNED.format("2 arcmin", shaft))).life(cycles=3, transient=2)
     (bearing,) = within.bearings
     assert bearing.tilt is not None
     assert bearing.tilt.bending == pytest.approx(shaft_slope(bearing.equivalent_load, 0.2, 0.02), rel=1e-12)
     assert bearing.tilt.beyond == ""
-    beyond = make_model("rotor", ("[bearing.damping]", ALIGNED.format("20 arcmin", ""))).life()
+    beyond = make_model("rotor", ("[bearing.damping]", ALIGNED.format("20 arcmin", ""))).life(cycles=3, transient=2)
     assert any("tilted by 20 arcmin" in words for words in beyond.beyond)
 
 

@@ -49,7 +49,7 @@ def test_three_words_of_a_drawing_give_the_life_of_their_numbers(
     make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = make_model("rotor", (END, WORDS + END))
-    (said,) = model.life().bearings
+    (said,) = model.life(cycles=3, transient=2).bearings
     viscosity = lubrication.viscosity("VG 68", 70.0)
     needed = 4500.0 * 3000.0**-0.5 * 33.5**-0.5
     assert said.viscosity_ratio == pytest.approx(1e6 * viscosity / needed, rel=1e-9)
@@ -57,11 +57,11 @@ def test_three_words_of_a_drawing_give_the_life_of_their_numbers(
     film = LubricationInfo(viscosity_ratio=None, viscosity=viscosity, contamination=0.5)
     numbers = replace(model.manifest.bearings[0], lubrication=film)
     monkeypatch.setattr(model, "manifest", replace(model.manifest, bearings=(numbers,)))
-    (plain,) = model.life().bearings
+    (plain,) = model.life(cycles=3, transient=2).bearings
     assert said.factor == plain.factor
     assert said.modified_life == plain.modified_life
     monkeypatch.undo()
-    assert f"κ {said.viscosity_ratio:.3g}, e_C 0.5" in str(model.life())
+    assert f"κ {said.viscosity_ratio:.3g}, e_C 0.5" in str(model.life(cycles=3, transient=2))
     assert said.life is not None
     load = said.dynamic_rating * (1e6 / said.life) ** (1 / 3)
     assert said.factor == pytest.approx(life.life_factor(said.viscosity_ratio, 0.5 * said.fatigue_limit / load))
@@ -89,6 +89,6 @@ def test_wrong_words_are_refused(scene_text: Callable[..., str], keys: str, key:
 
 def test_a_code_and_a_filter_give_the_factor_of_the_annex(make_model: Callable[..., Model]) -> None:
     film = '[bearing.lubrication]\nviscosity_ratio = 0.8\noil_code = "-/15/12"\nfilter = "in line"\n'
-    (found,) = make_model("rotor", (END, film + END)).life().bearings
+    (found,) = make_model("rotor", (END, film + END)).life(cycles=3, transient=2).bearings
     share = min(0.0432 * 0.8**0.68 * 33.5**0.55, 1.0)
     assert found.contamination == pytest.approx(share * (1.0 - 0.9987 / 33.5 ** (1 / 3)), rel=1e-12)
