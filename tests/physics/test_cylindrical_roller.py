@@ -381,6 +381,14 @@ def test_sensitivities_are_verified(make_model: Callable[..., Model]) -> None:
     ]
 
 
+@pytest.mark.long
+def test_sensitivities_of_the_press_whose_rollers_meet_and_part_are_verified(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press_roller")
+    wrt = ["bearing.clearance", "bearing.contact.length"]
+    report = model.sensitivity(["peak_ball_force", "mean:inner.y"], wrt)
+    assert all(pair.check.verdict is Verdict.VERIFIED for pair in report.pairs)
+
+
 def test_exponent_of_a_ball_gives_its_bits(
     make_model: Callable[..., Model], scene_text: Callable[..., str], tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
