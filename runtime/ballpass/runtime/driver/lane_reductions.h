@@ -109,8 +109,8 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         BP_EACH_LANE {
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
             const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
-            double q[5], low, high, sum, squares;
-            bp_quartic(v0, v1, v2, v3, v4, q);
+            const bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
+            double low, high, sum, squares;
             bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
             bp_moments(v0, v1, v2, v3, v4, q, b->shift[row + lane], k < BP_NX, &sum, &squares);
             if (k >= BP_LOOKED_AT) {

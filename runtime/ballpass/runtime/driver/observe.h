@@ -6,12 +6,13 @@
 #include "run.h"
 
 /* Outputs up to `end`, that of the accepted step from (t, x) to (t + h, next); t counts from the segment's start.  The caller gives the
-   end, for start + (t + h) may fall short of the segment's by rounding, and its output would then be lost. */
-static void write_outputs(bp_run *run, double start, double t, double h, double end)
+   end, for start + (t + h) may fall short of the segment's by rounding, and its output would then be lost.  Returns whether the step's dense
+   output is prepared. */
+static int write_outputs(bp_run *run, double start, double t, double h, double end)
 {
     ballpass_result *result = run->result;
-    if (result->written >= run->outputs) return;
-    if (run->output_times[result->written] > end) return;
+    if (result->written >= run->outputs) return 0;
+    if (run->output_times[result->written] > end) return 0;
     int prepared = 0, tangents_prepared = 0;
     while (result->written < run->outputs && run->output_times[result->written] <= end) {
         const double theta = ((run->output_times[result->written] - start) - t) / h;
@@ -28,6 +29,7 @@ static void write_outputs(bp_run *run, double start, double t, double h, double 
         tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
     }
+    return prepared;
 }
 
 /* The end of an accepted step [s], and whether it lies on a kink. */
@@ -64,10 +66,10 @@ static void reduce_start(bp_run *run, double start)
     bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[0], run->balls[0]);
 }
 
-static void reduce_step(bp_run *run, double start, double t, double h)
+static void reduce_step(bp_run *run, double start, double t, double h, int prepared)
 {
     if (run->reduction == NULL) return;
-    prepare_dense(run, t, h);
+    if (!prepared) prepare_dense(run, t, h);
     const int parts = bp_parts(bp_methods[run->method].dense_degree);
     const int of_balls = bp_balls_wanted(run->reduction), powers = bp_powers_wanted(run->reduction);
     for (int part = 0; part < parts; part++) {
@@ -86,7 +88,7 @@ static void reduce_step(bp_run *run, double start, double t, double h)
 }
 #else
 #define reduce_start(run, start) ((void)(start))
-#define reduce_step(run, start, t, h) ((void)0)
+#define reduce_step(run, start, t, h, prepared) ((void)(prepared))
 #endif
 
 #endif

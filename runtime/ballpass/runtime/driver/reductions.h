@@ -248,61 +248,70 @@ static inline double bp_top(double a, double va, double b, double vb, double c, 
     return top > a && top < c ? top : b;
 }
 
-/* The polynomial of degree four through the values at the quarters, in powers of s = 4 theta - 2. */
-static inline void bp_quartic(double v0, double v1, double v2, double v3, double v4, double *restrict q)
+/* A polynomial of degree four in powers of s = 4 theta - 2.  Handed over by value: an array has an address, and loops over lanes or channels
+   would keep one for each of them in memory, at distances that no vector is stored to. */
+typedef struct {
+    double c0, c1, c2, c3, c4;
+} bp_quartic;
+
+/* The one through the values at the quarters. */
+static inline bp_quartic bp_quartic_through(double v0, double v1, double v2, double v3, double v4)
 {
-    q[0] = v2;
-    q[1] = (8.0 * (v3 - v1) - (v4 - v0)) * (1.0 / 12.0);
-    q[2] = (16.0 * (v1 + v3) - (v0 + v4) - 30.0 * v2) * (1.0 / 24.0);
-    q[3] = ((v4 - v0) - 2.0 * (v3 - v1)) * (1.0 / 12.0);
-    q[4] = ((v0 + v4) - 4.0 * (v1 + v3) + 6.0 * v2) * (1.0 / 24.0);
+    return (bp_quartic){
+        v2,
+        (8.0 * (v3 - v1) - (v4 - v0)) * (1.0 / 12.0),
+        (16.0 * (v1 + v3) - (v0 + v4) - 30.0 * v2) * (1.0 / 24.0),
+        ((v4 - v0) - 2.0 * (v3 - v1)) * (1.0 / 12.0),
+        ((v0 + v4) - 4.0 * (v1 + v3) + 6.0 * v2) * (1.0 / 24.0),
+    };
 }
 
 /* Mean of its square over the step. */
-static inline double bp_mean_square(const double *restrict q)
+static inline double bp_mean_square(bp_quartic q)
 {
-    return q[0] * q[0] + 4.0 / 3.0 * (2.0 * q[0] * q[2] + q[1] * q[1]) + 16.0 / 5.0 * (2.0 * (q[0] * q[4] + q[1] * q[3]) + q[2] * q[2])
-           + 64.0 / 7.0 * (2.0 * q[2] * q[4] + q[3] * q[3]) + 256.0 / 9.0 * (q[4] * q[4]);
+    return q.c0 * q.c0 + 4.0 / 3.0 * (2.0 * q.c0 * q.c2 + q.c1 * q.c1) + 16.0 / 5.0 * (2.0 * (q.c0 * q.c4 + q.c1 * q.c3) + q.c2 * q.c2)
+           + 64.0 / 7.0 * (2.0 * q.c2 * q.c4 + q.c3 * q.c3) + 256.0 / 9.0 * (q.c4 * q.c4);
 }
 
 /* Means over the step of a channel less a shift, and of the square of that: of a small vibration on a large offset raw squares have few digits.
    `smooth`: that polynomial is the channel. */
-static inline void bp_moments(double v0, double v1, double v2, double v3, double v4, double *restrict q, double shift, int smooth,
+static inline void bp_moments(double v0, double v1, double v2, double v3, double v4, bp_quartic q, double shift, int smooth,
                               double *restrict mean, double *restrict square)
 {
     *mean = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2 - shift;
-    q[0] -= shift;
+    q.c0 -= shift;
     const double exact = bp_mean_square(q), a = v0 - shift, b = v1 - shift, c = v2 - shift, d = v3 - shift, e = v4 - shift;
     const double boole = bp_boole[0] * (a * a + e * e) + bp_boole[1] * (b * b + d * d) + bp_boole[2] * (c * c);
     *square = smooth ? exact : boole;
 }
 
 /* Bounds of that polynomial between its ends: its inner Bezier ordinates (it lies within their hull and that of its end values). */
-static inline void bp_hull(const double *restrict q, double *restrict hull)
+typedef struct {
+    double left, middle, right;
+} bp_hull;
+
+static inline bp_hull bp_hull_of(bp_quartic q)
 {
-    const double even = q[0] - 16.0 * q[4], odd = q[1] - 4.0 * q[3];
-    hull[0] = even - odd;
-    hull[1] = q[0] - 4.0 / 3.0 * q[2] + 16.0 * q[4];
-    hull[2] = even + odd;
+    const double even = q.c0 - 16.0 * q.c4, odd = q.c1 - 4.0 * q.c3;
+    return (bp_hull){even - odd, q.c0 - 4.0 / 3.0 * q.c2 + 16.0 * q.c4, even + odd};
 }
 
 /* Bounds of what a step may bring, from the values at its quarters and that polynomial: no extreme is looked for that lies within those
    known.  A parabola through three of the points rises above them by no more than an eighth of their range; beside a jump, where two of the
    points tell nothing of the third, a force decays by no more than half between two quarters. */
-static inline void bp_survey(double v0, double v1, double v2, double v3, double v4, const double *restrict q, double *restrict bottom,
+static inline void bp_survey(double v0, double v1, double v2, double v3, double v4, bp_quartic q, double *restrict bottom,
                              double *restrict top)
 {
-    double hull[3];
-    bp_hull(q, hull);
+    const bp_hull hull = bp_hull_of(q);
     const double a = v0 > v1 ? v0 : v1, c = v0 > v1 ? v1 : v0, d = v2 > v3 ? v2 : v3, e = v2 > v3 ? v3 : v2;
     double high = a > d ? a : d, low = c < e ? c : e;
     high = v4 > high ? v4 : high;
     low = v4 < low ? v4 : low;
-    const double reach = BP_BEYOND * (high - low), up = hull[0] > hull[1] ? hull[0] : hull[1], down = hull[0] > hull[1] ? hull[1] : hull[0];
+    const double reach = BP_BEYOND * (high - low), up = hull.left > hull.middle ? hull.left : hull.middle, down = hull.left > hull.middle ? hull.middle : hull.left;
     high = up > high + reach ? up : high + reach;
     low = down < low - reach ? down : low - reach;
-    *top = hull[2] > high ? hull[2] : high;
-    *bottom = hull[2] < low ? hull[2] : low;
+    *top = hull.right > high ? hull.right : high;
+    *bottom = hull.right < low ? hull.right : low;
 }
 
 /* What the search for one extreme of a channel within a step knows. */
@@ -377,32 +386,32 @@ static inline void bp_climb_quarter(const bp_search *search, const double *u, in
    is the channel. */
 static inline void bp_tops(const bp_search *search, const double *u)
 {
-    double q[5], hull[3], slope[BP_CELLS + 1];
+    double slope[BP_CELLS + 1];
     int top = 0;
     for (int i = 1; i < BP_POINTS; i++)
         if (u[i] > u[top]) top = i;
-    bp_quartic(u[0], u[1], u[2], u[3], u[4], q);
-    bp_hull(q, hull);
+    const bp_quartic q = bp_quartic_through(u[0], u[1], u[2], u[3], u[4]);
+    const bp_hull hull = bp_hull_of(q);
     const int middle = top == 0 ? 1 : top == BP_POINTS - 1 ? BP_POINTS - 2 : top;
     const double bend = u[middle - 1] - 2.0 * u[middle] + u[middle + 1], rise = 0.5 * (u[middle + 1] - u[middle - 1]);
     const double shift = bend < 0.0 ? -rise / bend : 0.0, place = (middle + shift) / (BP_POINTS - 1);
     const double above = u[middle] + 0.5 * rise * shift, known = search->sign * *search->best;
-    if (!(hull[0] > known || hull[1] > known || hull[2] > known || above > known)) return;
+    if (!(hull.left > known || hull.middle > known || hull.right > known || above > known)) return;
     /* every top of the polynomial: where its slope changes sign */
     for (int i = 0; i <= BP_CELLS; i++) {
         const double s = 4.0 * i / BP_CELLS - 2.0;
-        slope[i] = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
+        slope[i] = q.c1 + s * (2.0 * q.c2 + s * (3.0 * q.c3 + s * (4.0 * q.c4)));
     }
     for (int i = 0; i < BP_CELLS; i++) {
         if (!(slope[i] > 0.0 && slope[i + 1] <= 0.0)) continue;
         const double low = 4.0 * i / BP_CELLS - 2.0, high = 4.0 * (i + 1) / BP_CELLS - 2.0;
         double s = low + (high - low) * slope[i] / (slope[i] - slope[i + 1]);
         for (int k = 0; k < 4; k++) {
-            const double there = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
-            const double curve = 2.0 * q[2] + s * (6.0 * q[3] + s * (12.0 * q[4])), moved = curve < 0.0 ? s - there / curve : s;
+            const double there = q.c1 + s * (2.0 * q.c2 + s * (3.0 * q.c3 + s * (4.0 * q.c4)));
+            const double curve = 2.0 * q.c2 + s * (6.0 * q.c3 + s * (12.0 * q.c4)), moved = curve < 0.0 ? s - there / curve : s;
             s = moved < low ? low : moved > high ? high : moved;
         }
-        const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
+        const double promised = q.c0 + s * (q.c1 + s * (q.c2 + s * (q.c3 + s * q.c4)));
         if (promised > search->sign * *search->best) bp_climb_near(search, u, 0.25 * (s + 2.0), promised);
     }
     if (search->channel >= BP_NX && above > search->sign * *search->best && place > 0.0 && place < 1.0) bp_climb_near(search, u, place, above);
@@ -516,8 +525,8 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
 #pragma omp simd
     for (int k = 0; k < BP_CHANNELS; k++) {
         const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k];
-        double q[5], low, high;
-        bp_quartic(v0, v1, v2, v3, v4, q);
+        const bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
+        double low, high;
         bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
         top[k] = high;
         bottom[k] = low;

@@ -97,13 +97,13 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     ballpass_result *result = run->result;
     const bp_taken taken = run->taken;
     const double t = *time, h = taken.h, length = end - start;
-    write_outputs(run, start, t, h, taken.last ? end : start + (t + h));
+    const int prepared = write_outputs(run, start, t, h, taken.last ? end : start + (t + h));
     run->waiting = run->options->pause && result->written >= run->outputs;
     if (run->waiting) {
         result->step = run->step;
         return BALLPASS_PAUSED;
     }
-    reduce_step(run, start, t, h);
+    reduce_step(run, start, t, h, prepared);
     /* a step that was cut, or has its own pace, does not show which family suits */
     const int chosen = changeable && taken.met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
     tangent_accept(run);

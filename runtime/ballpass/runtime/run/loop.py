@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,7 +25,7 @@ from ballpass.runtime.run.failure_location import FailureLocation, locate_failur
 from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import joined_segments, rest_of, run_windows
+from ballpass.runtime.run.segments import SEGMENTS_A_CALL, joined_segments, rest_of, run_windows
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
@@ -177,6 +177,7 @@ class RunUnderWay:
     reached : time reached [s]
     stop : ends it between calls when it becomes nonzero
     stepper : an existing driver; None for the one that the run needs
+    segments : of the whole run, where they are known and one window; None: they are made
     steps, rejected, located, calls : counts; `located` of kinks
     families : the last family of an automatic choice, call by call
     """
@@ -187,6 +188,7 @@ class RunUnderWay:
     time: float
     stop: ctypes.c_int | None = None
     stepper: Stepper | None = None
+    segments: Segments | None = None
     steps: int = 0
     rejected: int = 0
     located: int = 0
@@ -206,7 +208,9 @@ class RunUnderWay:
         directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
         stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
         allowed = allowance(until - run.begin, run.turn, self.time, self.steps + self.rejected)
-        windows = run_windows(run.model, run.numbers, (self.time, until), run.turn, run.start)
+        windows: Iterable[Segments] = (self.segments,) if self.segments is not None else ()
+        if self.segments is None or (self.time, until) != (run.begin, run.end):
+            windows = run_windows(run.model, run.numbers, (self.time, until), run.turn, run.start)
         # a derivative at fixed time jumps with a load, and a call does not have the rate before its start
         for left in joined_segments(windows) if directions is not None else windows:
             held, taken, first_step = (stepper.hold() if directions is None else None), 0, 0.0
@@ -281,6 +285,7 @@ class RunUnderWay:
         return RunFailed(outcome.end, outcome.time, outcome.step, self.state, place, detail)
 
 
-def start_run(run: Run, sinks: Sequence[Sink]) -> RunUnderWay:
-    """A run before its first step."""
-    return RunUnderWay(run=run, sinks=sinks, state=run.initial.copy(), time=run.begin)
+def start_run(run: Run, sinks: Sequence[Sink], segments: Segments | None = None) -> RunUnderWay:
+    """A run before its first step; `segments`: all of it, where they are known."""
+    known = segments if segments is not None and len(segments.inputs) < SEGMENTS_A_CALL else None
+    return RunUnderWay(run=run, sinks=sinks, state=run.initial.copy(), time=run.begin, segments=known)

@@ -302,6 +302,7 @@ def _moments(
     if edges is None:
         edges = segment_edges(model, numbers, begin, begin + duration, turn)
     middles = 0.5 * (edges[:-1] + edges[1:])
-    picked = middles[np.linspace(0, len(middles) - 1, min(MOMENTS, len(middles))).astype(int)]
-    moments = np.concatenate([picked, begin + horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
+    if len(middles) > MOMENTS:
+        middles = middles[np.linspace(0, len(middles) - 1, MOMENTS).astype(int)]
+    moments = np.concatenate([middles, begin + horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
     return driver_angle.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon

@@ -181,7 +181,7 @@ def reductions_of(
     if not duration > 0.0:
         return None
     return Reductions(
-        channels={name: reduction_of(rows, row, name, duration) for name in names},
+        channels=_channels(rows, row, names, duration),
         start=float(row[HEAD.index("from")]),
         duration=duration,
         end=dict(zip(rows.states, end.tolist(), strict=True)),
@@ -193,20 +193,27 @@ def reductions_of(
 
 def reduction_of(rows: ReductionRows, row: np.ndarray, channel: str, duration: float) -> Reduction:
     """What a row holds of a channel over its duration [s]."""
-    entry = {kind: float(row[rows.column(kind, channel)]) for kind in ROWS}
-    of_ball = channel in rows.balls
-    shift, integral, square = (np.array(entry[kind]) for kind in ("shift", "integral", "square"))
-    mean, std = map(float, moments_of(shift, integral, square, np.array(duration)))
-    return Reduction(
-        maximum=entry["max"],
-        maximum_time=entry["max_time"],
-        maximum_ball=int(entry["max_ball"]) if of_ball else None,
-        minimum=entry["min"],
-        minimum_time=entry["min_time"],
-        minimum_ball=int(entry["min_ball"]) if of_ball else None,
-        mean=mean,
-        std=std,
-    )
+    return _channels(rows, row, (channel,), duration)[channel]
+
+
+def _channels(rows: ReductionRows, row: np.ndarray, names: Sequence[str], duration: float) -> dict[str, Reduction]:
+    places = [[rows.column(kind, name) for name in names] for kind in ROWS]
+    entries = dict(zip(ROWS, row[places], strict=True))
+    means, stds = moments_of(entries["shift"], entries["integral"], entries["square"], np.array(duration))
+    of = {kind: values.tolist() for kind, values in entries.items()} | {"mean": means.tolist(), "std": stds.tolist()}
+    return {
+        name: Reduction(
+            maximum=of["max"][k],
+            maximum_time=of["max_time"][k],
+            maximum_ball=int(of["max_ball"][k]) if name in rows.balls else None,
+            minimum=of["min"][k],
+            minimum_time=of["min_time"][k],
+            minimum_ball=int(of["min_ball"][k]) if name in rows.balls else None,
+            mean=of["mean"][k],
+            std=of["std"][k],
+        )
+        for k, name in enumerate(names)
+    }
 
 
 def joined(first: Reductions | None, second: Reductions | None) -> Reductions | None:

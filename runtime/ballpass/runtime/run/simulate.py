@@ -74,7 +74,7 @@ def simulate(
             )
             reducing = channels and directions is None
             sinks: list[Sink] = [samples, *([ReductionRow(row=rows[0], before=rows[1])] if reducing else [])]
-            going = start_run(run, sinks)
+            going = start_run(run, sinks, trajectory.segments)
             try:
                 going.go_on()
             finally:
