@@ -174,15 +174,15 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     tell = query.progress or (lambda _words, _fraction: None)
     refuse_chaos(model, numbers, quantities, replace(request, progress=partial(tell, "looking for growth")))
     tell("differentiating", 0.0)
-    course, tolerance = differentiate(QuantityRun(model, quantities), run, names, query.sensitivity_rtol)
+    along = QuantityRun(model, quantities)
+    course, tolerance = differentiate(along, run, names, query.sensitivity_rtol)
     values = np.array([item.value for item in course.estimates])
     slopes = np.array([item.slope for item in course.estimates])
     own = np.zeros_like(slopes)
     if query.check and model.states:
         tell("differentiating", 0.5)
         looser = replace(run, rtol=min(10.0 * query.rtol, 1e-3))
-        coarser = QuantityRun(model, quantities, rough=COARSER * ROUGH)
-        found, _ = differentiate(coarser, looser, names, 10.0 * tolerance)
+        found, _ = differentiate(along.with_panels(COARSER * ROUGH), looser, names, 10.0 * tolerance)
         own = np.abs(slopes - np.array([item.slope for item in found.estimates]))
     difference_scales = _difference_scales(run, names)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -327,7 +327,7 @@ def _grazing(
     if state:
         angles = signals[state].value[order, 0] % driver_angle.TURN
     else:
-        angles = np.array([driver_angle.crank_angle(manifest, numbers.values, float(time)) for time in times])
+        angles = driver_angle.crank_angles(manifest, numbers.values, times)
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

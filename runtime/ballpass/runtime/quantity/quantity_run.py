@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import time as clocks
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,9 +120,16 @@ class QuantityRun:
         self._reduced = [] if along_nodes else [item for item in self._moving if is_reduced(model, item)]
         self._noded = [item for item in self._moving if item not in self._reduced]
         self._channels = ChannelValues(model, channels_of(self._moving))
+        self._along_nodes = along_nodes
         self._layer = NodeLayer(model, self._channels, rough=rough, along_nodes=along_nodes)
         # outputs that follow from time alone need no integration
         self._runs = motion or not all(self._layer.is_still(item) for item in self._moving)
+
+    def with_panels(self, rough: float) -> QuantityRun:
+        """The same quantities in other panels, evaluated by the same functions, which are made once for both."""
+        found = copy(self)
+        found._layer = NodeLayer(self.model, self._channels, rough=rough, along_nodes=self._along_nodes)
+        return found
 
     def measure(self, run: Run) -> EvaluatedQuantities:
         """Values of all quantities.

@@ -60,8 +60,13 @@ def crank_angle(manifest: Manifest, values: Values, t: float, state: np.ndarray 
     if manifest.mechanism is not None and manifest.mechanism.angle:
         at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
         return float(driver_at(manifest, values, t)[0] if state is None else state[at]) % TURN
+    return float(crank_angles(manifest, values, np.array(t)))
+
+
+def crank_angles(manifest: Manifest, values: Values, times: np.ndarray) -> np.ndarray:
+    """The same at many times, of a driver or shaft whose speed does not change, in the shape of `times` [rad]."""
     start = values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    return (start + shaft_speed(manifest, values) * t) % TURN
+    return np.asarray((start + shaft_speed(manifest, values) * times) % TURN)
 
 
 def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, float]:
