@@ -664,3 +664,10 @@ def test_faults_of_duty_and_film_name_their_place(old: str, new: str, key: str, 
     found = {fault.key: fault.remedy for fault in faults(PRESS + edited(DUTY, old, new)).faults}
     assert key in found
     assert re.search(words, found[key])
+
+
+def test_a_misspelt_table_that_decides_about_other_keys_is_one_fault() -> None:
+    """A table in place of a constant force: neither is the constant missing, nor the direction one too many."""
+    text = edited((SCENES / "engine.toml").read_text(encoding="utf-8"), "forces.gas.table]", "forces.gas.tabel]")
+    (fault,) = faults(text, "engine").faults
+    assert (fault.key, fault.remedy) == ("mechanism.forces.gas.tabel", 'did you mean "table"?')

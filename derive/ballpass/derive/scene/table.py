@@ -143,8 +143,12 @@ class Table:
         if kind is not None:
             return
         absent = [key for key in self._known if key not in self.data]
-        for key in self.data:
-            if key not in self._known:
+        unknown = [key for key in self.data if key not in self._known]
+        misspelt = {key: get_close_matches(key, absent, n=1, cutoff=MISSPELT) for key in unknown}
+        # a table decides which other keys belong beside it: of these nothing is known where it is misspelt
+        decides = any(near and isinstance(self.data[key], dict) for key, near in misspelt.items())
+        for key, near in misspelt.items():
+            if near or not decides:
                 self.fault(
                     key,
                     "unknown key",
@@ -152,10 +156,10 @@ class Table:
                     allowed=listing(self._known),
                     remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
                 )
-                self._forget_missing(get_close_matches(key, absent, n=1, cutoff=MISSPELT))
+                self._forget_missing(absent if decides else near)
 
     def _forget_missing(self, keys: Sequence[str]) -> None:
-        """Take back that keys are missing: they are there, misspelt."""
+        """Take back that keys are missing: they are there, misspelt, or nothing is known of them."""
         places = {".".join((*self.path, key)) for key in keys}
         faults = self.collector.faults
         faults[:] = [one for one in faults if not (one.key in places and one.problem in (NO_KEY, NO_TABLE))]

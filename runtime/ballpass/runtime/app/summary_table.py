@@ -96,6 +96,7 @@ def _rounding(summary: Mapping[str, Any]) -> dict[str, float]:
         if isinstance(item, Mapping) and "unit" in item:
             sizes = [abs(item[key]) for key in ("min", "max") if key in item]
             largest[item["unit"]] = max([largest.get(item["unit"], 0.0), *sizes])
+    largest["J"] = largest.get("N*m", 0.0)  # the work of a torque
     return {unit: ROUNDING * size for unit, size in largest.items()}
 
 
@@ -113,7 +114,7 @@ def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -
         apart = max(2.0 * spread["std"], abs(item[key] - spread["mean"]))
         if apart < 5e-5 * abs(item[key]):  # the digits that are printed hold
             return f"{factor * item[key]:z.4g}"
-        return f"{factor * item[key]:z.3g} ± {factor * apart:.1g}"
+        return f"{factor * item[key]:z.3g}\n±{factor * apart:.1g}"  # below it: three of these fill a line
     star = "*" if item.get("searched", {}).get(key) == "samples" else ""
     return f"{factor * item[key]:z.4g}{star}"
 
