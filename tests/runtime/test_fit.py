@@ -49,7 +49,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say_and_are_as_narrow_as_they
     noises = np.geomspace(0.01, 0.10, 100)
     bound = _bound(press, TRUTH, "outer.y", 1.0, times)
     for seed, noise in enumerate(noises.tolist()):
-        found = press.fit(_data(press, TRUTH, "outer.y", noise, seed, times), VARY, progress=False)
+        found = press.fit(_data(press, TRUTH, "outer.y", noise, seed, times), VARY, starts=1, rtol=1e-8, progress=False)
         assert found.converged
         inside += [one.low < value < one.high for one, value in zip(found.numbers, values.tolist(), strict=True)]
         narrow.append([one.deviation for one in found.numbers] / (noise * bound))
