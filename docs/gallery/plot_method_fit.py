@@ -24,7 +24,7 @@ data = {"time": run.t + 0.7e-3, "inner.y": run["inner.y"] + noise}
 # Each parameter has bounds; the time of the data may be wrong by two milliseconds.
 vary = ["bearing.clearance=2 um:15 um", "loads.unbalance.mass=1 g:20 g:log"]
 found = model.fit(data, vary, begin=0.003, shift="-3 ms:1 ms")
-found
+print(found)
 
 # %%
 # What is left must look like noise.

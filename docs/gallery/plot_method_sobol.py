@@ -23,7 +23,7 @@ vary = [
 ]
 limit = "peak_ball_force <= 70 N"
 found = model.sobol(vary, "peak_ball_force", limit=limit, samples=256)
-found
+print(found)
 
 # %%
 # A total share near zero says that this tolerance may be as wide as it is. Where total

@@ -57,6 +57,12 @@ NAMED: dict[str, dict[str, str]] = {
         "is least, 3685.164 N": "an independent program; test_optimize.py",
         "limits another quantity": "a statement",
     },
+    "docs/howto/fit.md": {
+        "its 95 % interval": "`CONFIDENCE` of ask/fitting.py",
+    },
+    "docs/howto/sobol.md": {
+        "are N (d + 2) members": "the base samples A and B, and one for each input",
+    },
     "docs/howto/bifurcation.md": {
         "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",
         "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of ask/lyapunov.py",

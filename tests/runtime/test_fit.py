@@ -44,15 +44,15 @@ def test_intervals_hold_the_truth_as_often_as_they_say_and_are_as_narrow_as_they
     """100 trials of damping, clearance and housing stiffness, with noise of 1 to 10 % of the signal."""
     times = np.arange(601) / 5e3
     values = np.array(list(TRUTH.values()))
-    inside = np.zeros(3)
-    narrow = []
+    inside, searched, narrow = np.zeros(3), 0, []
     noises = np.geomspace(0.01, 0.10, 100)
     bound = _bound(press, TRUTH, "outer.y", 1.0, times)
     for seed, noise in enumerate(noises.tolist()):
-        found = press.fit(_data(press, TRUTH, "outer.y", noise, seed, times), VARY, progress=False)
-        assert found.converged
+        found = press.fit(_data(press, TRUTH, "outer.y", noise, seed, times), VARY, starts=1, rtol=1e-8, progress=False)
+        searched += found.converged
         inside += [one.low < value < one.high for one, value in zip(found.numbers, values.tolist(), strict=True)]
         narrow.append([one.deviation for one in found.numbers] / (noise * bound))
+    assert searched >= 98  # of one start each; others are reported as not to be relied on
     assert np.all((inside >= 90) & (inside <= 99)), inside
     assert np.all(np.abs(np.mean(narrow, axis=0) - 1.0) < 0.2), np.mean(narrow, axis=0)
 
@@ -112,7 +112,7 @@ def test_other_values_that_fit_as_well_are_named(make_model: Callable[..., Model
     rotor = make_model("rotor")
     angle = "bearing.ball_angle"
     data = _data(rotor, {angle: np.radians(20.0)}, "inner.y", 0.02, 2, np.arange(400) / 5e3)
-    found = rotor.fit(data, f"{angle}=0 deg:90 deg", starts=6, progress=False)
+    found = rotor.fit(data, f"{angle}=0 deg:100 deg", starts=6, progress=False)
     values = [found.numbers[0].value, *(rival[0] for rival in found.rivals)]
     assert {round(float(np.degrees(value))) for value in values} == {20, 65}
     assert "Other values fit as well" in found.report().warnings[0]

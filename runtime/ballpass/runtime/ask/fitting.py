@@ -157,9 +157,9 @@ def search(
         bounds=(low[free], high[free]),
         loss=loss,
         f_scale=LOSSES[loss],
-        ftol=1e-11,
-        xtol=1e-10,
-        gtol=1e-12,
+        ftol=1e-10,
+        xtol=1e-8,
+        gtol=1e-10,
         max_nfev=200,
     )
     return filled(found.x), float(found.cost), bool(found.status > 0)

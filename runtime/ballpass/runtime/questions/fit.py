@@ -60,8 +60,13 @@ Signals = Annotated[
     ),
 ]
 Begin = Annotated[
-    float,
-    Option(words="Time of the run at which the data's time is zero.", example='"0.24 s"', shown="TIME", unit="s"),
+    float | None,
+    Option(
+        words="Time of the run at which the data's time is zero; its start if none is given.",
+        example='"0.24 s"',
+        shown="TIME",
+        unit="s",
+    ),
 ]
 Shift = Annotated[
     str | None,
@@ -109,6 +114,15 @@ class FittedNumber:
     low, high : 95 % interval; NaN likewise, and for a profile that ends at a bound
     held : ``first`` or ``second`` where that end of its range holds it, else empty
     shown_unit, factor : unit for people, and its size
+
+    Examples
+    --------
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+    >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+    >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+    >>> (number,) = model.fit(data, "bearing.clearance=5 um:30 um").numbers
+    >>> number.low < 10e-6 < number.high, number.unit
+    (True, 'm')
     """
 
     name: str
@@ -133,6 +147,16 @@ class UndeterminedGroup:
     words : what is not determined
     combination : what of them is, as ``a · b``; empty where there is no single one
     value, deviation : of the combination, SI, and its standard deviation as a share of it; NaN where there is none
+
+    Examples
+    --------
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+    >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+    >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+    >>> inertia = "mechanism.bodies.crank.inertia=1 kg*mm^2:900 kg*mm^2"
+    >>> (group,) = model.fit(data, [inertia, "bearing.clearance=5 um:30 um"]).undetermined
+    >>> group.names
+    ('mechanism.bodies.crank.inertia',)
     """
 
     names: tuple[str, ...]
@@ -153,6 +177,15 @@ class FittedSignal:
     measured, model : samples, of the same shape
     noise : deviation of the differences, by the median for a robust loss
     correlation : of differences with the next one [1]
+
+    Examples
+    --------
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+    >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+    >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+    >>> (signal,) = model.fit(data, "bearing.clearance=5 um:30 um").signals
+    >>> 0.8e-8 < signal.noise < 1.2e-8, signal.unit
+    (True, 'm')
     """
 
     name: str
@@ -165,7 +198,16 @@ class FittedSignal:
 
     @property
     def white(self) -> bool:
-        """Whether differences look independent of each other, as intervals assume."""
+        """Whether differences look independent of each other, as intervals assume.
+
+        Examples
+        --------
+        >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+        >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+        >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+        >>> model.fit(data, "bearing.clearance=5 um:30 um").signals[0].white
+        True
+        """
         return abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
 
 
@@ -186,7 +228,8 @@ class Fit(ShortRepr, Reported):
 
     Examples
     --------
-    >>> run = model.simulate(duration=0.05, sample_rate=10e3, parameters={"bearing.clearance": 13e-6})
+    >>> wide = {"bearing.clearance": 13e-6}
+    >>> run = model.simulate(duration=0.05, sample_rate=10e3, parameters=wide)
     >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
     >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
     >>> found = model.fit(data, "bearing.clearance=5 um:30 um")
@@ -305,7 +348,7 @@ def fit(
     vary: Vary,
     signal: Signals = None,
     *,
-    begin: Begin = 0.0,
+    begin: Begin = None,
     shift: Shift = None,
     gain: Gain = False,
     offset: Offset = False,
@@ -360,7 +403,7 @@ def fit(
         model,
         [read_trial(model.manifest, source, columns, k) for k, source in enumerate(sources, start=1)],
         ranges,
-        begin=begin,
+        begin=0.0 if begin is None else begin,
         shift=_shift(shift),
         gain=gain,
         offset=offset,

@@ -35,7 +35,8 @@ Of = Annotated[str | Sequence[str] | None, Option(words="Quantity, as `peak_ball
 Spread = Annotated[
     str | Sequence[str],
     Option(
-        words="Parameter and its distribution: `A:B` (uniform), `A:B:log`, or one of SciPy. May be repeated.",
+        words="Parameter and its distribution: bounds, with `:log` behind them for equal factors, or one of SciPy. "
+        "May be repeated.",
         shown="PATH=DISTRIBUTION",
         example='bearing.clearance="norm:loc=10 um:scale=1 um"',
     ),
@@ -63,6 +64,13 @@ class KeptLimit:
     words : the limit
     kept, members : members that keep it, and all that have a result
     share, low, high : their ratio, and its 95 % interval by Wilson
+
+    Examples
+    --------
+    >>> clearance, limit = "bearing.clearance=5 um:15 um", "peak_ball_force <= 9 kN"
+    >>> found = model.sobol(clearance, limit=limit, cycles=3, samples=32, indices=False)
+    >>> found.limits[0].kept, found.limits[0].words
+    (32, 'peak_ball_force <= 9000 N')
     """
 
     words: str
@@ -83,6 +91,14 @@ class SpreadQuantity:
     mean, deviation, least, most : over the base members
     quantiles : at 5, 50 and 95 %
     shares : of the inputs in its variance, in their order; empty where none were asked for
+
+    Examples
+    --------
+    >>> clearance = "bearing.clearance=5 um:15 um"
+    >>> found = model.sobol(clearance, "rms:inner.y", cycles=3, samples=32, indices=False)
+    >>> peak = found.quantities[0]
+    >>> peak.least < peak.quantiles[1] < peak.most, peak.unit
+    (True, 'm')
     """
 
     name: str
