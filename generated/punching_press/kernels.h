@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_RINGS = 5, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RINGS = 5, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
@@ -16,7 +16,7 @@ static const int bp_is_angle[4] = {0, 0, 0, 0};
 
 #define BP_EACH_BEARING(DO) DO(0)
 
-enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_SLOPES = 6, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 16, BP_0_TURNING = 3, BP_0_TURNING_BY = 1, BP_0_STANDING = 10, BP_0_STANDING_BY = 3, BP_0_DAMAGE = 9, BP_0_DAMAGE_BY = 10 };
+enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_FIRST_RELATIVE = 0, BP_0_SUMS = 2, BP_0_FIRST_SUM = 0, BP_0_SLOPES = 6, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 16, BP_0_TURNING = 3, BP_0_TURNING_BY = 1, BP_0_STANDING = 10, BP_0_STANDING_BY = 3, BP_0_DAMAGE = 9, BP_0_DAMAGE_BY = 10 };
 
 static const double bp_0_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
 
