@@ -122,8 +122,8 @@ def test_a_spall_of_the_outer_ring_is_met_at_the_ball_pass_order_of_the_momentar
         """Amplitudes over orders, and which of them are near the line: no multiple of the shaft is."""
         numbers = {"bearings.at_A.defects.spall.chord": chord}
         run = model.simulate(times=times, duration=2.5, transient=0, rtol=1e-7, parameters=numbers, outputs=[signal])
-        speed = model.parameters["mechanism.driver.speed"]
-        angle = speed * times if drive == "constant speed" else run["driver.angle"]
+        even = drive == "constant speed"
+        angle = model.parameters["mechanism.driver.speed"] * times if even else run["driver.angle"]
         rates = np.gradient(angle, times)
         changes = {"constant speed": -1.0, "run-up by a table": 0.3, "motor": 0.03}
         assert np.ptp(rates) / np.mean(rates) > changes[drive]
