@@ -125,7 +125,7 @@ def test_a_spall_of_the_outer_ring_is_met_at_the_ball_pass_order_of_the_momentar
         even = drive == "constant speed"
         angle = model.parameters["mechanism.driver.speed"] * times if even else run["driver.angle"]
         rates = np.gradient(angle, times)
-        changes = {"constant speed": -1.0, "run-up by a table": 0.3, "motor": 0.03}
+        changes = {"constant speed": -1.0, "run-up by a table": 0.3, "motor": 0.01}
         assert np.ptp(rates) / np.mean(rates) > changes[drive]
         found = order_spectrum(angle, run[signal])
         return found, np.flatnonzero(np.abs(found.frequency - multiple * order) < 0.1)
@@ -161,10 +161,9 @@ def test_a_machine_that_coasts_keeps_its_energy_with_every_effect(tmp_path: Path
 
 
 @pytest.mark.long
-def test_derivatives_lanes_and_the_exported_program_agree_where_the_motion_meets_the_spalls(tmp_path: Path) -> None:
-    text = press(
-        bearing("A", law=TANGENT, effects=EFFECTS), bearing("B", "rod", effects=EFFECTS + SPALL), drive=MOTOR
-    ).replace("[run]", '[run]\nmethod = "stepper-dop853"\nrtol = 1e-9')
+def test_derivatives_and_members_are_right_where_the_motion_meets_the_spalls(tmp_path: Path) -> None:
+    """Against differences of located runs, and single runs; a motor turns the crank, and the rod swings."""
+    text = press(bearing("A", law=TANGENT, effects=EFFECTS), bearing("B", "rod", effects=EFFECTS + SPALL), drive=MOTOR)
     model = built(text, tmp_path / "press")
     names = [
         "bearings.at_B.defects.spall.angle",
