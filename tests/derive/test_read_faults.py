@@ -601,7 +601,7 @@ TWO_WAY = ("share = 0.5                             # [paper]", 'coupling = "two
         (('joint = "A"\ncoupling', 'joint = "B"\ncoupling'), "which one carries the inner ring"),
         (('coupling = "two-way"', 'coupling = "two-way"\nshare = 0.5'), "takes the load that the motion gives"),
         (
-            ("[bearing.damping]", "[bearing.outer_waviness]\norders = [3]\n[bearing.damping]"),
+            ("[bearing.damping]", '[bearing.cage]\njitter = { interval = "1 ms" }\n[bearing.damping]'),
             "rings that turn at constant",
         ),
     ],
