@@ -91,13 +91,9 @@ class BallBuilder:
         self.relative = self._relative()
         co, si, r = self.co, self.si, self.r
         self._rows = self._ball(*relative_motion(r, co, si), co, si)
-        # opposite balls share what their deflections are made of
-        along, rate = relative_motion(ca.vertcat(0.0, r[1:]), co, si)
-        self._pair = (
-            (self._ball(r[0] + along, rate, co, si), self._ball(r[0] - along, -rate, -co, -si))
-            if bearing.ball.count % 2 == 0
-            else None
-        )
+        # opposite balls share their direction, and the products with it
+        opposite = bearing.ball.count % 2 == 0
+        self._opposite = self._ball(*relative_motion(r, -co, -si), -co, -si) if opposite else None
 
     def _relative(self) -> ca.SX:
         """Coefficients r of deflection and rate, without what effects take.
@@ -158,9 +154,8 @@ class BallBuilder:
             "held_v": held(sp.diff(held_force, inner[1])),
         }
 
-    def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
-        """Rows of G."""
-        co, si = self.co, self.si
+    def _slopes(self, at: dict[str, ca.SX], co: ca.SX, si: ca.SX, by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Rows of G of a ball in a direction."""
         rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
         if self.bearing.ball.own is not None:
             moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
@@ -171,7 +166,7 @@ class BallBuilder:
         """The functions, once the vectors of constants and stage variables are complete."""
         co, si, r, at = self.co, self.si, self.r, self._rows
         sums = [at["F"] * co, at["F"] * si]
-        slopes = self._slopes(at, at["Fd"], at["Fv"])
+        slopes = self._slopes(at, co, si, at["Fd"], at["Fv"])
         takes = {"co": co, "si": si, "r": r}
         whole = {"p": p, "c": c, "w": w}
 
@@ -191,7 +186,7 @@ class BallBuilder:
             held = [at["held"] * co, at["held"] * si]
             own["switches"] = made("switches", [at["g"], at["g_rate"]])
             own["held_forces"] = made("held_forces", held, border)
-            own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, at["held_d"], at["held_v"])], border)
+            own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, co, si, at["held_d"], at["held_v"])], border)
         over_numbers = _over_numbers(own, len(takes))
         numbers = over_numbers["numbers"].size1_out(0)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
@@ -205,30 +200,22 @@ class BallBuilder:
             )
         partials = over_numbers["partials"].size1_out(0)
         over_numbers["sums_moved"] = _sums_moved(partials, numbers)
-        if self._pair is not None:
-            one, other = self._pair
-            both = [(one["F"] - other["F"]) * co, (one["F"] - other["F"]) * si]
-            joint = self._slopes_of_pair(one, other)
+        if self._opposite is not None:
+            # each ball's rows and then their sum, as single runs add them up: the same bits
+            to = self._opposite
+            both = [one + other for one, other in zip(sums, [to["F"] * -co, to["F"] * -si], strict=True)]
+            behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
+            joint = [one + other for one, other in zip(slopes, behind, strict=True)]
             over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}
         return BallKernels(
             prefix=self.bearing.names.prefix,
             balls=self.bearing.ball.count,
             over_numbers=over_numbers,
             over_model={**over_model, "contact": own["contact"]},
-            paired=self._pair is not None,
+            paired=self._opposite is not None,
             slopes=len(slopes),
             partials=partials - SUMS,
         )
-
-    def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
-        """Rows of G of a ball and of the one opposite, whose direction has the other sign."""
-        co, si = self.co, self.si
-        both = [at[f] + other[f] for f in ("Fd", "Fv")]
-        rows = ca.vertsplit(ring_motion_slopes().summands(co, si, *both))
-        if self.bearing.ball.own is not None:
-            moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_acceleration"]) for b in (at, other)]
-            rows += [(moved[0] - moved[1]) * co, (moved[0] - moved[1]) * si]
-        return rows
 
 
 def sums_by_time(slopes: ca.SX, *, own: bool) -> ca.SX:

@@ -98,7 +98,9 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
         else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
-        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->first[q]);
+        double time[BP_L] BP_ALIGNED;
+        BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
+        bp_lane_ball_channels(&b->numbers, time, y, b->powers, y + BP_NX * BP_L, b->first[q]);
     }
     double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};

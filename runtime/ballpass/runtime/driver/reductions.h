@@ -129,18 +129,23 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* Means over the balls of bearing b of powers of their forces `of` [N], loads in kN, into power[0 ... 2]; behind them 1. */
+/* Means over the balls of bearing b of powers of their forces `of` [N], loads in kN, into power[0 ... 2]; behind them 1.  Sums go from ball
+   to ball, as those of lanes. */
 #define BP_MEAN_POWERS(b, of, rooted, power)                                                           \
     {                                                                                                  \
-        double turning = 0.0, standing = 0.0;                                                          \
-        _Pragma("omp simd reduction(+ : turning, standing)")                                           \
+        double turning[BP_##b##_BALLS], standing[BP_##b##_BALLS], sum[2] = {0.0};                      \
+        _Pragma("omp simd")                                                                            \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                     \
             const double load = (of)[j] > 0.0 ? 1e-3 * (of)[j] : 0.0;                                  \
-            turning += bp_power(load, BP_##b##_TURNING, BP_##b##_TURNING_BY);                          \
-            standing += (rooted) ? bp_power(load, BP_##b##_STANDING, BP_##b##_STANDING_BY) : 0.0;      \
+            turning[j] = bp_power(load, BP_##b##_TURNING, BP_##b##_TURNING_BY);                        \
+            standing[j] = (rooted) ? bp_power(load, BP_##b##_STANDING, BP_##b##_STANDING_BY) : 0.0;    \
         }                                                                                              \
-        (power)[0] = turning / BP_##b##_BALLS;                                                         \
-        (power)[1] = standing / BP_##b##_BALLS;                                                        \
+        for (int j = 0; j < BP_##b##_BALLS; j++) {                                                     \
+            sum[0] += turning[j];                                                                      \
+            sum[1] += standing[j];                                                                     \
+        }                                                                                              \
+        (power)[0] = sum[0] / BP_##b##_BALLS;                                                          \
+        (power)[1] = sum[1] / BP_##b##_BALLS;                                                          \
         (power)[2] = (rooted) ? bp_power((power)[1], BP_##b##_DAMAGE, BP_##b##_DAMAGE_BY) : 0.0;       \
         (power)[3] = 1.0;                                                                              \
     }
@@ -199,9 +204,9 @@ static inline __attribute__((always_inline)) void bp_add_sectors(double *restric
         double sum = 0.0, moment = 0.0;
         for (int i = 0; i < BP_POINTS; i++) {
             const double force = of[i * BP_BALL_QUANTITIES + j], load = force > 0.0 ? 1e-3 * force : 0.0;
-            const double power = bp_power(load, p, q);
-            sum += bp_boole[i] * power;
-            moment += 0.25 * i * bp_boole[i] * power;
+            const double part = bp_boole[i] * bp_power(load, p, q);
+            sum += part;
+            moment += 0.25 * i * part;
         }
         if (sum > 0.0) bp_add_places(sectors, (double)j / balls, turned * sum, moment / sum, from, to);
     }
