@@ -186,7 +186,8 @@ class BallBuilder:
             held = [at["held"] * co, at["held"] * si]
             own["switches"] = made("switches", [at["g"], at["g_rate"]])
             own["held_forces"] = made("held_forces", held, border)
-            own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, co, si, at["held_d"], at["held_v"])], border)
+            behind = self._slopes(at, co, si, at["held_d"], at["held_v"])
+            own["held_slopes"] = made("held_slopes", [*held, *behind], border)
         over_numbers = _over_numbers(own, len(takes))
         numbers = over_numbers["numbers"].size1_out(0)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
