@@ -488,16 +488,22 @@ def test_loose_runs_held_down_by_stability_go_on_linearly_implicitly(make_model:
 
 
 def test_accurate_runs_take_the_high_order(press: Model) -> None:
-    """Where accuracy asks for steps far below the stability limit, order eight does better with fewer stages."""
-    exact = press.simulate(1, method="stepper-rodas5p", rtol=1e-12, samples_per_cycle=250)
-    error, steps = {}, {}
-    for method in ("stepper", "stepper-dp54"):
-        run = press.simulate(1, method=method, rtol=1e-9, samples_per_cycle=250, kinks="stepped-over")
-        steps[method] = run.statistics.steps or 0
-        error[method] = float(np.max(np.abs(run.x - exact.x) / exact.statistics.magnitudes))
-    # a step of order eight has twice the stages
-    assert 0 < 2 * steps["stepper"] < steps["stepper-dp54"], steps
-    assert error["stepper"] < error["stepper-dp54"], error
+    """Where accuracy asks for steps far below the stability limit, order eight does better with fewer stages.
+
+    In the median of clearances: how steps meet contacts moves the error of one run tenfold, of either method.
+    """
+    error: dict[str, list[float]] = {"stepper": [], "stepper-dp54": []}
+    for clearance in 1e-5 * (1.0 + 1e-3 * np.arange(9)):
+        given = {"samples_per_cycle": 250, "parameters": {"bearing.clearance": float(clearance)}}
+        exact = press.simulate(1, method="stepper-rodas5p", rtol=1e-12, **given)  # type: ignore[arg-type]
+        steps = {}
+        for method, found in error.items():
+            run = press.simulate(1, method=method, rtol=1e-9, kinks="stepped-over", **given)  # type: ignore[arg-type]
+            steps[method] = run.statistics.steps or 0
+            found.append(float(np.max(np.abs(run.x - exact.x) / exact.statistics.magnitudes)))
+        # a step of order eight has twice the stages
+        assert 0 < 2 * steps["stepper"] < steps["stepper-dp54"], steps
+    assert np.median(error["stepper"]) < np.median(error["stepper-dp54"]), error
 
 
 def test_runs_of_engineering_accuracy_stay_with_the_low_order(press: Model) -> None:

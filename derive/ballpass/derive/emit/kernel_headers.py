@@ -21,7 +21,7 @@ import sympy as sp
 from ballpass.derive.emit.c_printer import print_array, print_function
 from ballpass.derive.lowering.ball_kernels import CONTACT, BallKernels
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
-from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
+from ballpass.derive.lowering.kernels import Kernel, Kernels
 from ballpass.derive.lowering.ring_motion_slopes import RINGS
 from ballpass.derive.system import System
 from ballpass.derive.variables import DRIVER_ANGLE
@@ -38,6 +38,7 @@ _STAGE = frozenset({"t", "C", "S"})
 #: Kernels of a single state that a member of an ensemble has too.
 _OF_MEMBERS = (
     "angles",
+    "cage",
     "stage_turned",
     "stage_rate_turned",
     "relative",
@@ -287,11 +288,8 @@ def ensemble_header(kernels: Kernels) -> str:
             varying=frozenset(function.name_in()),
         )
 
-    turned, relative = kernels["stage_turned"].function, kernels["relative"].function
     parts = ['#include "kernels.h"', f"enum {{ BP_MEMBERS = {LANES} }}; /* lanes */"]
     parts += [member(kernels[name].function, "bp_member_", kernels[name].description) for name in _OF_MEMBERS]
-    cage = only_deflections("cage_turned", turned, relative, kernels.bearings)
-    parts.append(member(cage, "bp_member_", "Stage of deflections from cosines and sines"))
     for index, bearing in enumerate(kernels.bearings):
         pair = "a ball and the one opposite" if bearing.paired else "a ball"
         directions = bearing.balls // 2 if bearing.paired else bearing.balls

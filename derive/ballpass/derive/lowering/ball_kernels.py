@@ -113,13 +113,9 @@ class BallBuilder:
         rings = self._relative()
         co, si, r = self.co, self.si, self.r
         self._rows = self._ball(*relative_motion(r, co, si), co, si)
-        # opposite balls share what their deflections are made of
-        along, rate = relative_motion(ca.vertcat(0.0, r[1:]), co, si)
-        self._pair = (
-            (self._ball(r[0] + along, rate, co, si), self._ball(r[0] - along, -rate, -co, -si))
-            if bearing.ball.count % 2 == 0 and not self.uneven
-            else None
-        )
+        # opposite balls share their direction, and the products with it
+        opposite = bearing.ball.count % 2 == 0 and not self.uneven
+        self._opposite = self._ball(*relative_motion(r, -co, -si), -co, -si) if opposite else None
         motion = self._own_motion(self._rows)
         self._further |= {s: leaf for s, leaf in leaves.items() if self.uneven and ca.depends_on(motion, leaf)}
         expressions = [self._named(e) for e in self._further]
@@ -203,9 +199,8 @@ class BallBuilder:
             "held_v": held(sp.diff(held_force, inner[1])),
         }
 
-    def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
-        """Rows of G."""
-        co, si = self.co, self.si
+    def _slopes(self, at: dict[str, ca.SX], co: ca.SX, si: ca.SX, by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Rows of G of a ball in a direction."""
         if self.uneven:
             return self._every_slope(at, by_delta, by_rate)
         rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
@@ -276,7 +271,7 @@ class BallBuilder:
         """The functions, once the vectors of constants and stage variables are complete."""
         co, si, at = self.co, self.si, self._rows
         sums = self._sums(at, "F")
-        slopes = self._slopes(at, at["Fd"], at["Fv"])
+        slopes = self._slopes(at, co, si, at["Fd"], at["Fv"])
         # the kernels of balls that stand in no effect's way take the rings' motion alone
         turned = [ca.SX.sym("turned", RELATIVE - RINGS)] if self.uneven else []
         takes = {"co": co, "si": si, "r": ca.vertcat(self.r, *turned, *self._further.values())}
@@ -298,7 +293,8 @@ class BallBuilder:
             held = self._sums(at, "held")
             own["switches"] = made("switches", [at["g"], at["g_rate"]])
             own["held_forces"] = made("held_forces", held, border)
-            own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, at["held_d"], at["held_v"])], border)
+            behind = self._slopes(at, co, si, at["held_d"], at["held_v"])
+            own["held_slopes"] = made("held_slopes", [*held, *behind], border)
         over_numbers = _over_numbers(own, len(takes))
         numbers = over_numbers["numbers"].size1_out(0)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
@@ -312,17 +308,19 @@ class BallBuilder:
             )
         partials = over_numbers["partials"].size1_out(0)
         over_numbers["sums_moved"] = self._sums_moved(partials, numbers, len(sums), len(slopes))
-        if self._pair is not None:
-            one, other = self._pair
-            both = [(one["F"] - other["F"]) * co, (one["F"] - other["F"]) * si]
-            joint = self._slopes_of_pair(one, other)
+        if self._opposite is not None:
+            # each ball's rows and then their sum, as single runs add them up: the same bits
+            to = self._opposite
+            both = [one + other for one, other in zip(sums, [to["F"] * -co, to["F"] * -si], strict=True)]
+            behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
+            joint = [one + other for one, other in zip(slopes, behind, strict=True)]
             over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}
         return BallKernels(
             prefix=self.bearing.names.prefix,
             balls=self.bearing.ball.count,
             over_numbers=over_numbers,
             over_model={**over_model, "contact": own["contact"]},
-            paired=self._pair is not None,
+            paired=self._opposite is not None,
             sums=len(sums),
             slopes=len(slopes),
             partials=partials - len(sums),
@@ -342,16 +340,6 @@ class BallBuilder:
         moved = by_r + by_r0 * r_d[0] + angled * a_d + by_k @ k_d
         takes = {"T": total, "r_d": r_d, "a_d": a_d, "k_d": k_d}
         return ca.Function("sums_moved", [*takes.values()], [ca.densify(moved)], [*takes], ["S_d"])
-
-    def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
-        """Rows of G of a ball and of the one opposite, whose direction has the other sign."""
-        co, si = self.co, self.si
-        both = [at[f] + other[f] for f in ("Fd", "Fv")]
-        rows = ca.vertsplit(ring_motion_slopes().summands(co, si, *both))
-        if self.bearing.ball.own is not None:
-            moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_third"]) for b in (at, other)]
-            rows += [(moved[0] - moved[1]) * co, (moved[0] - moved[1]) * si]
-        return rows
 
 
 def _is_smooth_in(value: ca.SX, symbol: ca.SX) -> bool:

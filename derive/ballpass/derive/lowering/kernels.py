@@ -321,13 +321,6 @@ def _parts(vector: ca.SX, sizes: Sequence[int]) -> list[ca.SX]:
 
 def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:
     """``cage``: the stage variables that deflections need; the other entries of w are zero."""
-    return Kernel(function=only_deflections("cage", stage, relative, bearings), description="Stage of deflections")
-
-
-def only_deflections(
-    name: str, stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]
-) -> ca.Function:
-    """A function `stage` without what deflections have no use for."""
     arguments = [ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())]
     w = stage(*arguments)
     rows, columns = relative.jac_sparsity(0, relative.name_in().index("w")).get_triplet()
@@ -337,7 +330,8 @@ def only_deflections(
         numbers = bearing.over_numbers["numbers"]
         needed |= {*numbers.jac_sparsity(0, numbers.name_in().index("w")).get_col()}
     kept = ca.vertcat(*(w[k] if k in needed else ca.SX(0.0) for k in range(w.numel())))
-    return ca.Function(name, arguments, [ca.densify(kept)], stage.name_in(), ["w"])
+    function = ca.Function("cage", arguments, [ca.densify(kept)], stage.name_in(), ["w"])
+    return Kernel(function=function, description="Stage of deflections")
 
 
 def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Kernel]:

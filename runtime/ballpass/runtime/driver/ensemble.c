@@ -45,21 +45,20 @@ static void begin_segment(const bp_job *job, long m)
     if (!(job->member[m].step > least)) job->member[m].step = least;
 }
 
-/* Put a member whose segment has begun into a lane, all that depends on the segment included. */
-/* First powers of the balls' loads, out of all quantities of the balls. */
+/* The powers of the balls' loads that sectors add up, out of all quantities of the balls. */
 static void put_powers(bp_lane_block *b, int lane, const double *balls)
 {
 #define BP_PUT(b_)                                                                                       \
     for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                          \
         const double force = balls[BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL + j];                         \
         const double load = force > 0.0 ? 1e-3 * force : 0.0;                                            \
-        b->first[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] =                                          \
-            bp_power(load, BP_##b_##_TURNING, BP_##b_##_TURNING_BY);                                     \
+        b->first[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] = bp_power(load, BP_SECTOR_POWER(b_));     \
     }
     BP_EACH_BEARING(BP_PUT)
 #undef BP_PUT
 }
 
+/* Put a member whose segment has begun into a lane, all that depends on the segment included. */
 static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
 {
     const long m = b->who[lane];
@@ -88,7 +87,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     b->reducing[lane] = 0.0;
     if (job->reductions != NULL && b->start[lane] >= job->reductions[m * BP_REDUCTION + BP_FROM]) {
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES], *row = job->reductions + m * BP_REDUCTION;
-        bp_channels(&n, at->t, x, b->balls, b->powers, value, balls);
+        bp_channels(&n, at->t, x, row, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
         if (!(row[BP_DURATION] > 0.0)) memcpy(row + BP_SHIFT, value, BP_LOOKED_AT * sizeof *value);
         put(b->shift, lane, row + BP_SHIFT, BP_CHANNELS);
@@ -113,10 +112,9 @@ static void enter_lane(const bp_job *job, bp_lane_block *b, int lane, long m)
         const double *row = job->reductions + m * BP_REDUCTION;
         const int begun = row[BP_DURATION] > 0.0;
         for (int k = 0; k < BP_CHANNELS; k++) {
-            b->maximum[k * BP_L + lane] = begun ? row[BP_MAX + k] : -INFINITY;
-            b->minimum[k * BP_L + lane] = begun ? row[BP_MIN + k] : INFINITY;
-            b->integral[k * BP_L + lane] = row[BP_INTEGRAL + k];
-            b->square[k * BP_L + lane] = row[BP_SQUARE + k];
+            for (int e = 0; e < BP_EXTREMES; e++)
+                b->best[e][k * BP_L + lane] = begun ? row[BP_EXTREME + 3 * e * BP_CHANNELS + k] : -bp_sign[e] * INFINITY;
+            for (int m = 0; m < BP_MOMENTS; m++) b->moment[m][k * BP_L + lane] = row[BP_MOMENT + m * BP_CHANNELS + k];
         }
     }
     enter_segment(job, b, lane);
@@ -141,8 +139,7 @@ static void leave_lane(const bp_job *job, bp_lane_block *b, int lane, int status
     result->step = b->step[lane];
     if (job->reductions != NULL) {
         double *row = job->reductions + m * BP_REDUCTION;
-        get(b->integral, lane, row + BP_INTEGRAL, BP_CHANNELS);
-        get(b->square, lane, row + BP_SQUARE, BP_CHANNELS);
+        for (int m = 0; m < BP_MOMENTS; m++) get(b->moment[m], lane, row + BP_MOMENT + m * BP_CHANNELS, BP_CHANNELS);
     }
     result->time = b->start[lane] + b->t[lane];
     at->t = b->t[lane];

@@ -53,8 +53,8 @@ typedef struct {
     double dense[BP_DENSE_ROWS][BP_NX * BP_L] BP_ALIGNED;
     double sampled[BP_POINTS][BP_CHANNELS * BP_L] BP_ALIGNED;
     double first[BP_POINTS][(BP_NB > 0 ? BP_NB : 1) * BP_L] BP_ALIGNED; /* first powers of the balls' loads at the quarters, where wanted */
-    double maximum[BP_CHANNELS * BP_L] BP_ALIGNED, minimum[BP_CHANNELS * BP_L] BP_ALIGNED;
-    double shift[BP_CHANNELS * BP_L] BP_ALIGNED, integral[BP_CHANNELS * BP_L] BP_ALIGNED, square[BP_CHANNELS * BP_L] BP_ALIGNED;
+    double best[BP_EXTREMES][BP_CHANNELS * BP_L] BP_ALIGNED;
+    double shift[BP_CHANNELS * BP_L] BP_ALIGNED, moment[BP_MOMENTS][BP_CHANNELS * BP_L] BP_ALIGNED;
     long who[BP_L];
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
     int method;         /* which this pass advances */

@@ -86,34 +86,42 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
     }
 }
 
-/* A kernel of bearing b for `directions` balls (of opposite pairs one), its first rows added to S and the others to G. */
+/* A kernel of bearing b for all its directions (of opposite balls one), its first rows added up to S and the others to G, in the order of
+   bp_total. */
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
-    for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
-        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                                 \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
-        bp_member_##b##_##kernel##_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                                       \
-        for (int m = 0; m < BP_##b##_SUMS; m++) BP_EACH_LANE S[(BP_##b##_FIRST_SUM + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
-        for (int m = 0; m < (slopes); m++)                                                                                       \
-            BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(BP_##b##_SUMS + m) * BP_L + lane];                 \
+    {                                                                                                                            \
+        double sum[BP_SUMMANDS][(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                                                               \
+        for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                          \
+            double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, more[(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                             \
+            double *rows = j < BP_SUMMANDS ? sum[j] : more;                                                                      \
+            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                  \
+            bp_member_##b##_##kernel##_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                         \
+            for (int m = 0; m < BP_##b##_SUMS + (slopes) && j >= BP_SUMMANDS; m++)                                                           \
+                BP_EACH_LANE sum[j % BP_SUMMANDS][m * BP_L + lane] += more[m * BP_L + lane];                                     \
+        }                                                                                                                        \
+        for (int j = BP_##b##_DIRECTIONS; j < BP_SUMMANDS; j++)                                                                  \
+            for (int i = 0; i < (BP_##b##_SUMS + (slopes)) * BP_L; i++) sum[j][i] = 0.0;                                                     \
+        for (int m = 0; m < BP_##b##_SUMS + (slopes); m++) {                                                                                 \
+            double *restrict to = m < BP_##b##_SUMS ? S + (BP_##b##_FIRST_SUM + m) * BP_L : G + (BP_##b##_FIRST_SLOPE + m - BP_##b##_SUMS) * BP_L;                  \
+            BP_EACH_LANE to[lane] = (sum[0][m * BP_L + lane] + sum[2][m * BP_L + lane])                                          \
+                                    + (sum[1][m * BP_L + lane] + sum[3][m * BP_L + lane]);                                       \
+        }                                                                                                                        \
     }
 
 /* Sums over the balls of each bearing: F cos, F sin. */
 BP_INLINE void bp_lane_sums(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {
-    double *G = NULL;
-    (void)G;
-    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
+    double *const G = NULL;
 #define BP_SUM(b) BP_LANE_SUM(b, forces, 0)
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM
+    (void)G;
 }
 
 /* The same, and the sums G of the slopes. */
 BP_INLINE void bp_lane_sums_and_slopes(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S,
                                        double *restrict G)
 {
-    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
-    for (int i = 0; i < BP_NG * BP_L; i++) G[i] = 0.0;
 #define BP_SUM(b) BP_LANE_SUM(b, slopes, BP_##b##_SLOPES)
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM
@@ -142,44 +150,43 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 
-/* First power of the load of a ball of bearing b, and its share in the means over the balls. */
-#define BP_LANE_POWERS(b, force, rooted, first, power)                                                                           \
-    {                                                                                                                            \
-        const double share = 1.0 / BP_##b##_BALLS;                                                                               \
-        double load[BP_L] BP_ALIGNED;                                                                                            \
-        BP_EACH_LANE {                                                                                                           \
-            load[lane] = (force)[lane] > 0.0 ? 1e-3 * (force)[lane] : 0.0;                                                       \
-            (first)[lane] = bp_power(load[lane], BP_##b##_TURNING, BP_##b##_TURNING_BY);                                         \
-            (power)[lane] += share * (first)[lane];                                                                              \
-        }                                                                                                                        \
-        if (rooted)                                                                                                              \
-            BP_EACH_LANE (power)[BP_L + lane] += share * bp_power(load[lane], BP_##b##_STANDING, BP_##b##_STANDING_BY);          \
-    }
+/* A power of the load of a ball, added to the sum over the balls, where it is wanted; the mean, and a power of one. */
+#define BP_LANE_POWER(b, row, exponent)                                                                                          \
+    if (wanted[row] != 0.0)                                                                                                      \
+        BP_EACH_LANE power[(row) * BP_L + lane] += bp_power(load[lane], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
+#define BP_LANE_MEAN(b, row, exponent) BP_EACH_LANE power[(row) * BP_L + lane] /= BP_##b##_BALLS;
+#define BP_LANE_POWER_OF(b, row, mean, exponent)                                                                                 \
+    if (wanted[row] != 0.0)                                                                                                      \
+        BP_EACH_LANE power[(row) * BP_L + lane] = bp_power(power[(mean) * BP_L + lane], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
 
-/* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball, then, where they are wanted,
-   three powers of the loads and 1; and then the first powers of all balls. */
-static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
-                                         const double *restrict t, const double *restrict h, const double *restrict x, int powers,
-                                         double *restrict value, double *restrict first)
+/* Channels of the balls (see reductions.h) in lanes, at the times `time`: of each bearing quantities of the most loaded ball, then, where any
+   is wanted, powers of the loads; and then the powers of all balls that sectors add up. */
+static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const double *restrict time, const double *restrict x,
+                                         const double *restrict all_wanted, int powers, double *restrict value, double *restrict first)
 {
     double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
-    double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
-    bp_lane_turn(angles, theta, t, h, C, S, time);
-    bp_member_cage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
+    bp_member_cage_lanes(time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
-    double *power = value + 4 * BP_BEARINGS * BP_L;
-    for (int i = 0; i < BP_POWERS * BP_BEARINGS * BP_L; i++) power[i] = i / BP_L % BP_POWERS == 3 ? 1.0 : 0.0;
 #define BP_CHANNEL(b)                                                                                                            \
-    for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
-        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                         \
-        bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                                          \
-        _Pragma("omp simd")                                                                                                      \
-        for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
-        if (powers) BP_LANE_POWERS(b, rows, powers > 1, first + (BP_##b##_FIRST_BALL + j) * BP_L, power + BP_POWERS * (b) * BP_L) \
-    }                                                                                                                            \
-    if (powers > 1)                                                                                                              \
-        BP_EACH_LANE power[(BP_POWERS * (b) + 2) * BP_L + lane] = bp_power(power[(BP_POWERS * (b) + 1) * BP_L + lane], BP_##b##_DAMAGE, BP_##b##_DAMAGE_BY);
+    {                                                                                                                            \
+        const double *wanted = all_wanted + BP_LOOKED_AT + BP_POWERS * (b);                                                      \
+        double *to = value + BP_BALL_CHANNELS * (b) * BP_L, *power = value + (BP_BALL_CHANNELS * BP_BEARINGS + BP_POWERS * (b)) * BP_L; \
+        for (int i = 0; i < BP_POWERS * BP_L; i++) power[i] = i < (BP_POWERS - 1) * BP_L ? 0.0 : 1.0;                            \
+        for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
+            double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED, load[BP_L] BP_ALIGNED;    \
+            double *own = first + (BP_##b##_FIRST_BALL + j) * BP_L;                                                              \
+            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                  \
+            bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                            \
+            _Pragma("omp simd")                                                                                                  \
+            for (int i = 0; i < BP_BALL_CHANNELS * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];               \
+            if (!powers) continue;                                                                                               \
+            BP_EACH_LANE load[lane] = rows[lane] > 0.0 ? 1e-3 * rows[lane] : 0.0;                                                \
+            BP_EACH_LANE own[lane] = bp_power(load[lane], BP_SECTOR_POWER(b));                                                   \
+            BP_EACH_MEAN(b, BP_LANE_POWER)                                                                                       \
+        }                                                                                                                        \
+        BP_EACH_MEAN(b, BP_LANE_MEAN)                                                                                            \
+        BP_EACH_POWER_OF(b, BP_LANE_POWER_OF)                                                                                    \
+    }
     BP_EACH_BEARING(BP_CHANNEL)
 #undef BP_CHANNEL
 }

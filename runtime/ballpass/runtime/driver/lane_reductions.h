@@ -71,7 +71,7 @@ static void add_passes(const bp_job *job, bp_lane_block *b, double part, double 
         bp_passes(b->t[lane] + (part + span) * b->h[lane], x, n.u, n.p, n.c, to);
         for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
             const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            b->integral[(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
+            if (b->wanted[BP_LOOKED_AT + k] != 0.0) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
         }
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
@@ -98,31 +98,37 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
         else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
-        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->first[q]);
+        double time[BP_L] BP_ALIGNED;
+        BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
+        bp_lane_ball_channels(&b->numbers, time, y, b->wanted, b->powers, y + BP_NX * BP_L, b->first[q]);
     }
-    double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
+    double news[BP_EXTREMES][BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};
     for (int k = 0; k < BP_CHANNELS; k++) {
         if (b->wanted[k] == 0.0) continue;
-        double *restrict of = news[k];
         const int row = k * BP_L;
         BP_EACH_LANE {
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
-            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
-            const bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
-            double low, high, sum, squares;
+            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane], shift = b->shift[row + lane];
+            bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
+            double low, high, sums[BP_MOMENTS];
             bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
-            bp_moments(v0, v1, v2, v3, v4, q, b->shift[row + lane], k < BP_NX, &sum, &squares);
+            q.c0 -= shift;
+#define BP_OF_DEGREE(m, degree) sums[m] = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);
+            BP_EACH_MOMENT(BP_OF_DEGREE)
+#undef BP_OF_DEGREE
             if (k >= BP_LOOKED_AT) {
-                power[k - BP_LOOKED_AT][lane] = sum;
+                power[k - BP_LOOKED_AT][lane] = sums[0];
                 continue;
             }
-            b->integral[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * sum : 0.0;
-            b->square[row + lane] += add[lane] != 0.0 ? span * b->h[lane] * squares : 0.0;
-            const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
-            of[lane] = add[lane] * (above + 2.0 * below);
-            any[lane] += of[lane];
-            of_balls[lane] += k < BP_NX ? 0.0 : of[lane];
+            for (int m = 0; m < BP_MOMENTS; m++) b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * sums[m] : 0.0;
+            for (int e = 0; e < BP_EXTREMES; e++) {
+                const double bound = bp_sign[e] > 0.0 ? high : low;
+                const double new = bp_sign[e] * bound > bp_sign[e] * b->best[e][row + lane] ? add[lane] : 0.0;
+                news[e][k][lane] = new;
+                any[lane] += new;
+                of_balls[lane] += k < BP_NX ? 0.0 : new;
+            }
         }
     }
     for (int lane = 0; lane < BP_L; lane++) {
@@ -134,11 +140,10 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], &source.n, lane_state, &source, balls};
         for (int k = 0; k < BP_CHANNELS; k++) {
             if (b->wanted[k] == 0.0) continue;
-            const double *v = b->sampled[0] + k * BP_L + lane;
-            if (news[k][lane] == 1.0 || news[k][lane] == 3.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, &step);
-            if (news[k][lane] >= 2.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, &step);
-            b->maximum[k * BP_L + lane] = reduction[BP_MAX + k];
-            b->minimum[k * BP_L + lane] = reduction[BP_MIN + k];
+            for (int e = 0; e < BP_EXTREMES && k < BP_LOOKED_AT; e++) {
+                if (news[e][k][lane] != 0.0) bp_extreme(reduction, e, k, b->sampled[0] + k * BP_L + lane, BP_CHANNELS * BP_L, &step);
+                b->best[e][k * BP_L + lane] = reduction[BP_EXTREME + 3 * e * BP_CHANNELS + k];
+            }
         }
     }
     if (b->powers) add_passes(job, b, part, span, add, (const double(*)[BP_L])power);

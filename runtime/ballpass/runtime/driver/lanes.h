@@ -2,54 +2,10 @@
 #ifndef BALLPASS_LANES_H
 #define BALLPASS_LANES_H
 
-#include <stdint.h>
 #include <string.h>
 
 #include "control.h"
 #include "lane_model.h"
-
-/* Bits of a number in each lane. */
-typedef union {
-    double value[BP_L];
-    uint64_t bits[BP_L];
-} bp_lane_bits;
-
-/* Natural logarithm of positive numbers and exponential of moderate ones without branches and tables, for the step size controller: to
-   1e-11, and the same in every lane. */
-static inline void bp_lane_log(const double *restrict x, double *restrict y)
-{
-    bp_lane_bits from BP_ALIGNED, exponent BP_ALIGNED, fraction BP_ALIGNED;
-    BP_EACH_LANE from.value[lane] = x[lane] * 1.4142135623730951; /* so that the fraction is about one */
-    BP_EACH_LANE exponent.bits[lane] = (from.bits[lane] >> 52) | UINT64_C(0x4330000000000000);
-    BP_EACH_LANE fraction.bits[lane] = (from.bits[lane] & UINT64_C(0xFFFFFFFFFFFFF)) | UINT64_C(0x3FF0000000000000);
-    BP_EACH_LANE {
-        const double m = fraction.value[lane] * 0.7071067811865476, s = (m - 1.0) / (m + 1.0), z = s * s, zz = z * z;
-        /* in pairs: the next step waits for it */
-        const double low = (1.0 + z * (1.0 / 3)) + zz * (1.0 / 5 + z * (1.0 / 7));
-        const double series = low + zz * zz * ((1.0 / 9 + z * (1.0 / 11)) + zz * (1.0 / 13));
-        y[lane] = (exponent.value[lane] - (4503599627370496.0 + 1023.0)) * 0.6931471805599453 + 2.0 * s * series;
-    }
-}
-
-static inline void bp_lane_exp(const double *restrict x, double *restrict y, const double *accepted, const double *error, double order)
-{
-    (void)accepted;
-    (void)error;
-    (void)order;
-    bp_lane_bits shifted BP_ALIGNED, power BP_ALIGNED;
-    double series[BP_L] BP_ALIGNED;
-    BP_EACH_LANE {
-        /* adding 1.5 * 2^52 rounds to a whole number and puts it into the low bits */
-        const double bounded = x[lane] > 40.0 ? 40.0 : x[lane], z = bounded < -40.0 ? -40.0 : bounded;
-        shifted.value[lane] = z * 1.4426950408889634 + 6755399441055744.0;
-        const double r = z - (shifted.value[lane] - 6755399441055744.0) * 0.6931471805599453, rr = r * r;
-        const double low = (1.0 + r) + rr * (1.0 / 2 + r * (1.0 / 6));
-        const double high = (1.0 / 24 + r * (1.0 / 120)) + rr * ((1.0 / 720 + r * (1.0 / 5040)) + rr * (1.0 / 40320 + r * (1.0 / 362880)));
-        series[lane] = low + rr * rr * high;
-    }
-    BP_EACH_LANE power.bits[lane] = (shifted.bits[lane] + UINT64_C(1023)) << 52;
-    BP_EACH_LANE y[lane] = series[lane] * power.value[lane];
-}
 
 /* A number of each member. */
 typedef double bp_lane __attribute__((vector_size(BP_L * sizeof(double)), aligned(8), may_alias));

@@ -94,21 +94,27 @@ static inline __attribute__((always_inline)) void bp_stages_and_end(const bp_num
 }
 
 /* Terms of a sum over the balls are added in an order that is written here, not by the compiler's choice of lanes: every library made of
-   this file, and every processor, gives the same bits. */
-enum { BP_SUMMANDS = 8 };
+   this file, and every processor, gives the same bits, and so do lanes of members (lane_model.h).  Opposite balls first, where there are
+   such; then every fourth term; then these four sums. */
+enum { BP_SUMMANDS = 4 };
 typedef double bp_summands __attribute__((vector_size(BP_SUMMANDS * sizeof(double)), aligned(8), may_alias));
 
 static inline __attribute__((always_inline)) double bp_total(const double *restrict terms, const int balls)
 {
+    const int directions = balls % 2 == 0 ? balls / 2 : balls;
     bp_summands sum = {0.0};
     int j = 0;
-    for (; j + BP_SUMMANDS <= balls; j += BP_SUMMANDS) sum += *(const bp_summands *)(terms + j);
-    if (j < balls) {
+    for (; j + BP_SUMMANDS <= directions; j += BP_SUMMANDS) {
+        bp_summands both = *(const bp_summands *)(terms + j);
+        if (balls % 2 == 0) both += *(const bp_summands *)(terms + directions + j);
+        sum += both;
+    }
+    if (j < directions) {
         bp_summands rest = {0.0};
-        for (int i = j; i < balls; i++) rest[i - j] = terms[i];
+        for (int i = j; i < directions; i++) rest[i - j] = balls % 2 == 0 ? terms[i] + terms[directions + i] : terms[i];
         sum += rest;
     }
-    return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
 
 /* Place of the cosine of a cage's angle in the relative motion r; its sine follows. */

@@ -63,7 +63,7 @@ static void reduce_start(bp_run *run, double start)
     run->reduction = run->options->reduction;
     if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
     if (run->reduction == NULL) return;
-    bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[0], run->balls[0]);
+    bp_channels(&run->numbers, 0.0, run->x, run->reduction, run->sampled[0], run->balls[0]);
 }
 
 static void reduce_step(bp_run *run, double start, double t, double h, int prepared)
@@ -71,13 +71,12 @@ static void reduce_step(bp_run *run, double start, double t, double h, int prepa
     if (run->reduction == NULL) return;
     if (!prepared) prepare_dense(run, t, h);
     const int parts = bp_parts(bp_methods[run->method].dense_degree);
-    const int of_balls = bp_balls_wanted(run->reduction), powers = bp_powers_wanted(run->reduction);
     for (int part = 0; part < parts; part++) {
         const bp_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};
         for (int i = 1; i < BP_POINTS; i++) {
             double y[BP_NX];
             const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
-            bp_channels(&run->numbers, time, y, of_balls, powers, run->sampled[i], run->balls[i]);
+            bp_channels(&run->numbers, time, y, run->reduction, run->sampled[i], run->balls[i]);
         }
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
         const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};

@@ -31,34 +31,9 @@
 
 #include "model.h"
 #include "powers.h"
+#include "reduction_tables.h"
 
-enum {
-    BP_POINTS = 5,
-    BP_BALL_CHANNELS = 4,
-    BP_POWERS = 4,   /* of the loads of a bearing, the last one is 1 */
-    BP_SECTORS = 72, /* of a raceway */
-    BP_LOOKED_AT = BP_NX + BP_BALL_CHANNELS * BP_BEARINGS, /* channels with extremes */
-    BP_CHANNELS = BP_LOOKED_AT + BP_POWERS * BP_BEARINGS
-};
-
-/* Places in a reduction: the head, then BP_CHANNELS entries of each kind. */
-enum {
-    BP_FROM = 0,     /* nothing is reduced in segments that start before this time [s]; given by the caller */
-    BP_DURATION = 1, /* time reduced so far [s] */
-    BP_HEAD = 2,
-    BP_WANTED = BP_HEAD, /* not zero for a channel that is wanted; given by the caller */
-    BP_MAX = BP_WANTED + BP_CHANNELS,
-    BP_MAX_TIME = BP_MAX + BP_CHANNELS,
-    BP_MAX_BALL = BP_MAX_TIME + BP_CHANNELS, /* counted from 1; 0 for a state */
-    BP_MIN = BP_MAX_BALL + BP_CHANNELS,
-    BP_MIN_TIME = BP_MIN + BP_CHANNELS,
-    BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
-    BP_SHIFT = BP_MIN_BALL + BP_CHANNELS,  /* the channel where reductions start; 0 for powers of loads */
-    BP_INTEGRAL = BP_SHIFT + BP_CHANNELS,  /* of the channel less the shift, over time; of powers over the angle turned [rad] */
-    BP_SQUARE = BP_INTEGRAL + BP_CHANNELS, /* of the square of that */
-    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the first power likewise: of each bearing outer, then inner raceway */
-    BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
-};
+enum { BP_POINTS = 5 };
 
 enum {
     BP_REFINEMENTS = 28, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
@@ -76,16 +51,12 @@ static inline int bp_balls_wanted(const double *reduction)
     return wanted;
 }
 
-/* 1 where the first powers are, 2 where those that may need roots are wanted as well. */
+/* Whether powers of the loads are. */
 static inline int bp_powers_wanted(const double *reduction)
 {
-    int powers = 0, rooted = 0;
-    for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
-        const int wanted = reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0;
-        powers |= wanted;
-        rooted |= wanted && k % BP_POWERS > 0 && k % BP_POWERS < 3;
-    }
-    return powers + rooted;
+    int wanted = 0;
+    for (int k = BP_LOOKED_AT; k < BP_CHANNELS; k++) wanted |= reduction[BP_WANTED + k] != 0.0;
+    return wanted;
 }
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
@@ -129,26 +100,25 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* Means over the balls of bearing b of powers of their forces `of` [N], loads in kN, into power[0 ... 2]; behind them 1. */
-#define BP_MEAN_POWERS(b, of, rooted, power)                                                           \
-    {                                                                                                  \
-        double turning = 0.0, standing = 0.0;                                                          \
-        _Pragma("omp simd reduction(+ : turning, standing)")                                           \
-        for (int j = 0; j < BP_##b##_BALLS; j++) {                                                     \
-            const double load = (of)[j] > 0.0 ? 1e-3 * (of)[j] : 0.0;                                  \
-            turning += bp_power(load, BP_##b##_TURNING, BP_##b##_TURNING_BY);                          \
-            standing += (rooted) ? bp_power(load, BP_##b##_STANDING, BP_##b##_STANDING_BY) : 0.0;      \
-        }                                                                                              \
-        (power)[0] = turning / BP_##b##_BALLS;                                                         \
-        (power)[1] = standing / BP_##b##_BALLS;                                                        \
-        (power)[2] = (rooted) ? bp_power((power)[1], BP_##b##_DAMAGE, BP_##b##_DAMAGE_BY) : 0.0;       \
-        (power)[3] = 1.0;                                                                              \
+/* Powers of the loads of bearing b from its balls' forces `of` [N], loads in kN and nothing where they pull, those that are `wanted`; behind
+   them 1.  Sums go from ball to ball, as those of lanes. */
+#define BP_MEAN_POWER(b, row, exponent)                                                                \
+    if ((wanted)[row] != 0.0) {                                                                        \
+        double term[BP_##b##_BALLS], sum = 0.0;                                                        \
+        _Pragma("omp simd")                                                                            \
+        for (int j = 0; j < BP_##b##_BALLS; j++)                                                       \
+            term[j] = bp_power(of[j] > 0.0 ? 1e-3 * of[j] : 0.0, BP_##b##_##exponent, BP_##b##_##exponent##_BY); \
+        for (int j = 0; j < BP_##b##_BALLS; j++) sum += term[j];                                       \
+        power[row] = sum / BP_##b##_BALLS;                                                             \
     }
+#define BP_POWER_OF(b, row, mean, exponent)                                                            \
+    if ((wanted)[row] != 0.0) power[row] = bp_power(power[mean], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
 
-/* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
-static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, int powers, double *restrict value,
-                               double *restrict q)
+/* All channels at a state and time, and all quantities of the balls; those of the balls are zero where the row `reduction` wants none. */
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, const double *restrict reduction,
+                               double *restrict value, double *restrict q)
 {
+    const int balls = bp_balls_wanted(reduction);
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
     if (!balls) return;
@@ -161,8 +131,14 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
         value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
     }                                                                                                  \
-    if (powers)                                                                                        \
-        BP_MEAN_POWERS(b, q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, powers > 1, value + BP_LOOKED_AT + BP_POWERS * (b))
+    {                                                                                                  \
+        const double *of = q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL;                                 \
+        const double *wanted = reduction + BP_WANTED + BP_LOOKED_AT + BP_POWERS * (b);                 \
+        double *power = value + BP_LOOKED_AT + BP_POWERS * (b);                                        \
+        BP_EACH_MEAN(b, BP_MEAN_POWER)                                                                 \
+        BP_EACH_POWER_OF(b, BP_POWER_OF)                                                               \
+        power[BP_POWERS - 1] = 1.0;                                                                    \
+    }
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
 }
@@ -199,9 +175,9 @@ static inline __attribute__((always_inline)) void bp_add_sectors(double *restric
         double sum = 0.0, moment = 0.0;
         for (int i = 0; i < BP_POINTS; i++) {
             const double force = of[i * BP_BALL_QUANTITIES + j], load = force > 0.0 ? 1e-3 * force : 0.0;
-            const double power = bp_power(load, p, q);
-            sum += bp_boole[i] * power;
-            moment += 0.25 * i * bp_boole[i] * power;
+            const double part = bp_boole[i] * bp_power(load, p, q);
+            sum += part;
+            moment += 0.25 * i * part;
         }
         if (sum > 0.0) bp_add_places(sectors, (double)j / balls, turned * sum, moment / sum, from, to);
     }
@@ -273,16 +249,22 @@ static inline double bp_mean_square(bp_quartic q)
            + 64.0 / 7.0 * (2.0 * q.c2 * q.c4 + q.c3 * q.c3) + 256.0 / 9.0 * (q.c4 * q.c4);
 }
 
-/* Means over the step of a channel less a shift, and of the square of that: of a small vibration on a large offset raw squares have few digits.
-   `smooth`: that polynomial is the channel. */
-static inline void bp_moments(double v0, double v1, double v2, double v3, double v4, bp_quartic q, double shift, int smooth,
-                              double *restrict mean, double *restrict square)
+/* Mean over the step of a power of the channel less a shift: of a small vibration on a large offset raw squares have few digits.  `q`: that
+   polynomial less the shift; `smooth`: it is the channel. */
+BP_POWER double bp_moment(const int degree, double v0, double v1, double v2, double v3, double v4, bp_quartic q, double shift, int smooth)
 {
-    *mean = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2 - shift;
-    q.c0 -= shift;
-    const double exact = bp_mean_square(q), a = v0 - shift, b = v1 - shift, c = v2 - shift, d = v3 - shift, e = v4 - shift;
-    const double boole = bp_boole[0] * (a * a + e * e) + bp_boole[1] * (b * b + d * d) + bp_boole[2] * (c * c);
-    *square = smooth ? exact : boole;
+    if (degree == 1) return bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2 - shift;
+    double exact = 0.0;
+    if (degree == 2) exact = bp_mean_square(q);
+    else
+        for (int i = 0; i < BP_GAUSS; i++) {
+            const double s = bp_gauss[i];
+            exact += bp_gauss_weight[i] * bp_whole_power(q.c0 + s * (q.c1 + s * (q.c2 + s * (q.c3 + s * q.c4))), degree);
+        }
+    const double boole = bp_boole[0] * (bp_whole_power(v0 - shift, degree) + bp_whole_power(v4 - shift, degree))
+                         + bp_boole[1] * (bp_whole_power(v1 - shift, degree) + bp_whole_power(v3 - shift, degree))
+                         + bp_boole[2] * bp_whole_power(v2 - shift, degree);
+    return smooth ? exact : boole;
 }
 
 /* Bounds of that polynomial between its ends: its inner Bezier ordinates (it lies within their hull and that of its end values). */
@@ -452,15 +434,15 @@ static inline int bp_dips(const double *start, const double *end, int balls, dou
 /* Extreme of a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
 static inline void bp_ball_extreme(bp_search search, const double *u)
 {
-    const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS, deflection = BP_BALL_CHANNELS - 1;
+    const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS;
     const double *of[BP_POINTS], *gap[BP_POINTS];
     int balls;
     for (int i = 0; i < BP_POINTS; i++) {
         of[i] = bp_ball_row(search.step->balls[i], row, &balls);
-        gap[i] = of[i] + (deflection - kind) * balls;
+        gap[i] = of[i] + (BP_DEFLECTION - kind) * balls;
     }
-    /* forces jump where a contact begins or ends, and no ball carries more than the most loaded one */
-    const int jumps = kind == 0 || kind == 2;
+    /* no ball carries more than the most loaded one */
+    const int jumps = bp_jumps[kind];
     if (search.sign < 0.0) {
         double least[BP_POINTS - 1];
         if (!(bp_least(of, balls, least) < *search.best)) return;
@@ -490,12 +472,12 @@ static inline void bp_ball_extreme(bp_search search, const double *u)
 /* Bring one extreme of a channel up to date with a step.
 
    reduction   the row
-   value       place of the extreme in the row; its time and ball follow
-   sign        1 for a maximum, -1 for a minimum
+   extreme     its number
    v           the channel at the quarters, `stride` apart */
-BP_SELDOM void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, const bp_within *step)
+BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const double *v, int stride, const bp_within *step)
 {
-    const bp_search search = {reduction + value + channel, sign, step, channel, 0};
+    const double sign = bp_sign[extreme];
+    const bp_search search = {reduction + BP_EXTREME + 3 * extreme * BP_CHANNELS + channel, sign, step, channel, 0};
     double *best = search.best, u[BP_POINTS];
     int top = 0, balls;
     for (int i = 0; i < BP_POINTS; i++) {
@@ -521,25 +503,28 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
     const double h = step->h;
     const int first = !(reduction[BP_DURATION] > 0.0);
     for (int k = 0; k < BP_LOOKED_AT && first; k++) reduction[BP_SHIFT + k] = v[0][k];
-    double sum[BP_CHANNELS], square[BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
+    double moment[BP_MOMENTS][BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
 #pragma omp simd
     for (int k = 0; k < BP_CHANNELS; k++) {
-        const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k];
-        const bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
+        const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k], shift = reduction[BP_SHIFT + k];
+        bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
         double low, high;
         bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
+        q.c0 -= shift;
         top[k] = high;
         bottom[k] = low;
-        bp_moments(v0, v1, v2, v3, v4, q, reduction[BP_SHIFT + k], k < BP_NX, &sum[k], &square[k]);
+#define BP_OF_DEGREE(m, degree) moment[m][k] = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);
+        BP_EACH_MOMENT(BP_OF_DEGREE)
+#undef BP_OF_DEGREE
     }
     for (int k = 0; k < BP_LOOKED_AT; k++) {
         if (reduction[BP_WANTED + k] == 0.0) continue;
-        reduction[BP_INTEGRAL + k] += h * sum[k];
-        reduction[BP_SQUARE + k] += h * square[k];
-        if (first || top[k] > reduction[BP_MAX + k])
-            bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, step);
-        if (first || bottom[k] < reduction[BP_MIN + k])
-            bp_extreme(reduction, BP_MIN, k, -1.0, v[0] + k, BP_CHANNELS, step);
+        for (int m = 0; m < BP_MOMENTS; m++) reduction[BP_MOMENT + m * BP_CHANNELS + k] += h * moment[m][k];
+        for (int e = 0; e < BP_EXTREMES; e++) {
+            const double bound = bp_sign[e] > 0.0 ? top[k] : bottom[k];
+            if (first || bp_sign[e] * bound > bp_sign[e] * reduction[BP_EXTREME + 3 * e * BP_CHANNELS + k])
+                bp_extreme(reduction, e, k, v[0] + k, BP_CHANNELS, step);
+        }
     }
     if (bp_powers_wanted(reduction)) {
         double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
@@ -550,10 +535,10 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         }
         for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
             const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            if (reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0) reduction[BP_INTEGRAL + BP_LOOKED_AT + k] += turned * sum[BP_LOOKED_AT + k];
+            if (reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0) reduction[BP_MOMENT + BP_LOOKED_AT + k] += turned * moment[0][BP_LOOKED_AT + k];
         }
 #define BP_ADD(b)                                                                                                                       \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_##b##_TURNING, BP_##b##_TURNING_BY,                \
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_SECTOR_POWER(b),                                   \
                    bp_turned(from + 2 * (b), to + 2 * (b)), of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD

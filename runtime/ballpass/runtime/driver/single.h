@@ -4,6 +4,7 @@
 
 #include <float.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "method_tables.h"
 #include "model.h"
@@ -66,12 +67,6 @@ BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
 {
     (void)i;
     return d * at->at[c];
-}
-
-static inline void bp_log(const double *x, double *y) { *y = log(*x); }
-static inline void bp_exp(const double *x, double *y, const double *accepted, const double *error, double order)
-{
-    *y = *accepted != 0.0 ? exp(*x) : pow(*error, -1.0 / order);
 }
 
 /* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */

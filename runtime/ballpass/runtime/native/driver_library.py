@@ -19,6 +19,7 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
+from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 
 #: Folder with the C sources of the drivers.
 DRIVER = Path(__file__).parent.parent / "driver"
@@ -101,7 +102,7 @@ def compile_driver(folder: Path, manifest: Manifest, compiler: Compiler, driver:
         compiler,
         label=f"{manifest.scene}-{driver.kind}",
         headers=[*sorted(DRIVER.glob("*.h")), *(place / name for name in driver.headers)],
-        made_headers={METHOD_TABLES: method_tables()},
+        made_headers={METHOD_TABLES: method_tables(), REDUCTION_TABLES: reduction_tables()},
         include=(place, DRIVER),
         flags=(*FLAGS, *own, *driver.flags),
         digests=digests_of(place, manifest),

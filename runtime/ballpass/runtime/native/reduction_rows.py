@@ -1,8 +1,11 @@
-"""Rows of on-line reductions as the driver writes them (`driver/reductions.h`).
+"""Rows of on-line reductions: what the driver takes of every step, and where it writes it (`driver/reductions.h`).
 
-A row is a head and, for every channel, one number of each kind in `ROWS`.  Channels are the states, then four
-quantities of the balls of each bearing, each with its value of the most loaded ball at the moment, then the powers of
-each bearing's ball loads that fatigue needs, and one.  Of these the integrals alone mean something: over the angle that
+The tables here are the only list.  `reduction_tables` writes them as C, which is compiled with the driver: single runs,
+lanes and sectors loop over them.
+
+A row is a head and, for every channel, one number of each kind in `ROWS`.  Channels are the states, then the quantities
+of the balls of each bearing, each with its value of the most loaded ball at the moment, then the powers of each
+bearing's ball loads that fatigue needs, and one.  Of these the integrals alone mean something: over the angle that
 the inner ring turns against the outer one, for fatigue counts passes.  Behind all stand the places of the raceways.
 """
 
@@ -22,23 +25,65 @@ from ballpass.runtime.ratings.of_bearing import rated_element
 
 Array: TypeAlias = NDArray[np.float64]
 
-#: Head of a row, and what follows for every channel; integrals are of the channel less its shift, and of the square
-#: of that.
+#: Head of a row.
 HEAD = ("from", "duration")
-ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", "shift", "integral", "square")
 
-#: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
-BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
+#: Extremes of a channel, by their sign; each is a value, its time and its ball.
+EXTREMES = {"max": 1, "min": -1}
 
-#: Behind these for each bearing: means over its balls of powers of their loads, see `LoadPowers` of the readings, and
-#: one, whose integral is the angle that the inner ring turned against the outer one [rad].
-LOAD_POWERS = ("load.turning", "load.standing", "load.outer_damage", "load.turned")
+#: Integrals of powers of the channel less its shift, by their exponent.  A further one is a line here: exact for
+#: states, whose dense output is a polynomial, by Boole's rule for the balls.
+MOMENTS = {"integral": 1, "square": 2}
 
 #: The channel that shows whether a bearing can be so, and the largest share of a ball's diameter that it may be [1].
 DEFLECTION, FLATTENED = "ball.deflection", 0.1
 
-#: Places of a raceway.
-SECTORS = 72
+#: What a row holds of every channel.
+ROWS = (
+    "wanted",
+    *(f"{name}{what}" for name in EXTREMES for what in ("", "_time", "_ball")),
+    "shift",
+    *MOMENTS,
+)
+
+#: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball, in the order of
+#: the generated kernel; whether they jump where a contact begins or ends.
+JUMPS = {"ball.force": True, "ball.elastic_force": False, "ball.damping_force": True, "ball.deflection": False}
+BALL_CHANNELS = tuple(JUMPS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadPowerRow:
+    """A power of the loads of a bearing's balls.
+
+    Attributes
+    ----------
+    name : without the bearing's prefix
+    exponent : name of the exponent in the generated kernels
+    of : the row whose power this one is; empty for the mean over the balls of that power of their loads
+    """
+
+    name: str
+    exponent: str
+    of: str = ""
+
+
+#: Behind these for each bearing, see `LoadPowers` of the readings.
+POWERS = (
+    LoadPowerRow(name="load.turning", exponent="TURNING"),
+    LoadPowerRow(name="load.standing", exponent="STANDING"),
+    LoadPowerRow(name="load.outer_damage", exponent="DAMAGE", of="load.standing"),
+)
+
+#: One, whose integral is the angle that the inner ring turned against the outer one [rad].
+TURNED = "load.turned"
+LOAD_POWERS = (*(power.name for power in POWERS), TURNED)
+
+#: Places of a raceway, and the power of the loads that is added up there.
+SECTORS, SECTOR_POWER = 72, "TURNING"
+
+#: Name of the header.
+REDUCTION_TABLES = "reduction_tables.h"
 
 
 @dataclass(frozen=True)  # without slots: what is asked for some hundred times a run is kept
@@ -98,8 +143,11 @@ class ReductionRows:
         """
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")] = start
+        # what a power is made of is wanted with it
+        below = (n.removesuffix(power.name) + power.of for n in channels for power in POWERS if n.endswith(power.name))
+        wanted = {*channels, *below}
         for name in self.channels:
-            rows[:, self.column("wanted", name)] = name in channels or (bool(channels) and name.endswith(DEFLECTION))
+            rows[:, self.column("wanted", name)] = name in wanted or (bool(channels) and name.endswith(DEFLECTION))
         return rows
 
 
@@ -150,6 +198,67 @@ def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo,
     layout = reduction_rows(manifest)
     for bearing in manifest.bearings:
         yield bearing, rows[:, layout.column("max", bearing.prefix + DEFLECTION)]
+
+
+@lru_cache(maxsize=1)
+def reduction_tables() -> str:
+    """Text of the header ``reduction_tables.h``."""
+    nodes, weights = np.polynomial.legendre.leggauss(2 * max(MOMENTS.values()) + 1)
+    names = [power.name for power in POWERS]
+    means = [f"MEAN(b, {k}, {p.exponent})" for k, p in enumerate(POWERS) if not p.of]
+    powers = [f"OF(b, {k}, {names.index(p.of)}, {p.exponent})" for k, p in enumerate(POWERS) if p.of]
+    looked_at = f"BP_NX + {len(BALL_CHANNELS)} * BP_BEARINGS"
+    places = (f"BP_{name.upper()} = {k}" for k, name in enumerate(HEAD))
+    kinds = {name: f"{len(HEAD)} + {k} * BP_CHANNELS" for k, name in enumerate(ROWS)}
+    end = f"{len(HEAD)} + {len(ROWS)} * BP_CHANNELS"
+    return f"""\
+/* What on-line reductions take of a step, from native/reduction_rows.py: do not edit. */
+#ifndef BALLPASS_REDUCTION_TABLES_H
+#define BALLPASS_REDUCTION_TABLES_H
+
+enum {{
+    BP_BALL_CHANNELS = {len(BALL_CHANNELS)},
+    BP_DEFLECTION = {BALL_CHANNELS.index("ball.deflection")}, /* among them */
+    BP_POWERS = {len(LOAD_POWERS)},    /* of the loads of a bearing, the last one is 1 */
+    BP_SECTORS = {SECTORS},  /* of a raceway */
+    BP_EXTREMES = {len(EXTREMES)},
+    BP_MOMENTS = {len(MOMENTS)},
+    BP_LOOKED_AT = {looked_at}, /* channels with extremes and moments */
+    BP_CHANNELS = BP_LOOKED_AT + BP_POWERS * BP_BEARINGS
+}};
+
+/* Places in a row: the head, then BP_CHANNELS entries of each kind.  An extreme is a value, its time and its ball;
+   moments follow each other.  Behind them integrals of the first power of the loads: of each bearing outer, then inner
+   raceway. */
+enum {{
+    {", ".join(places)},
+    BP_WANTED = {kinds["wanted"]},
+    BP_EXTREME = {kinds[next(iter(EXTREMES))]},
+    BP_SHIFT = {kinds["shift"]},
+    BP_MOMENT = {kinds[next(iter(MOMENTS))]},
+    BP_RACEWAYS = {end},
+    BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
+}};
+
+/* Whether channels of the balls jump where a contact begins or ends; signs of the extremes. */
+static const int bp_jumps[BP_BALL_CHANNELS] = {{{", ".join(str(int(jumps)) for jumps in JUMPS.values())}}};
+static const double bp_sign[BP_EXTREMES] = {{{", ".join(f"{sign:.1f}" for sign in EXTREMES.values())}}};
+
+/* Exponents of the moments. */
+#define BP_EACH_MOMENT(DO) {" ".join(f"DO({k}, {degree})" for k, degree in enumerate(MOMENTS.values()))}
+
+/* Gauss's rule that is exact for these powers of a polynomial of degree four, over -2 ... 2. */
+enum {{ BP_GAUSS = {len(nodes)} }};
+static const double bp_gauss[BP_GAUSS] = {{{", ".join(repr(2.0 * float(s)) for s in nodes)}}};
+static const double bp_gauss_weight[BP_GAUSS] = {{{", ".join(repr(0.5 * float(s)) for s in weights)}}};
+
+/* Powers of the loads of bearing b: means over its balls, then powers of such means. */
+#define BP_EACH_MEAN(b, MEAN) {" ".join(means)}
+#define BP_EACH_POWER_OF(b, OF) {" ".join(powers)}
+#define BP_SECTOR_POWER(b) BP_##b##_{SECTOR_POWER}, BP_##b##_{SECTOR_POWER}_BY
+
+#endif
+"""
 
 
 def moments_of(shift: Array, integral: Array, square: Array, duration: Array) -> tuple[Array, Array]:

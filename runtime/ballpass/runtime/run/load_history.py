@@ -17,7 +17,7 @@ import numpy as np
 from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, reduction_rows
+from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, TURNED, reduction_rows
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
 from ballpass.runtime.ratings.readings import LoadPowers, lives
 from ballpass.runtime.run import driver_angle
@@ -122,7 +122,7 @@ def _history(going: ReducedRun) -> LoadHistory:
             raceways=found.raceways[0],
         )
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
-        turned = going.row[layout.column("integral", bearing.prefix + LOAD_POWERS[-1])]
+        turned = going.row[layout.column("integral", bearing.prefix + TURNED)]
         speeds[bearing.prefix] = float(turned) / duration
     return LoadHistory(
         run=replace(going.run, end=going.run.start + duration),

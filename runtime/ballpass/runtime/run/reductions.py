@@ -22,6 +22,7 @@ from ballpass.runtime.native.reduction_rows import (
     LOAD_POWERS,
     ROWS,
     SECTORS,
+    TURNED,
     ReductionRows,
     moments_of,
     reduction_rows,
@@ -250,8 +251,8 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
 def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> LoadPowers:
     """Mean powers of a bearing's ball loads over its passes from reductions, shape (members, .)."""
     layout = reduction_rows(manifest)
-    every = [rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS]
-    turned = np.where(every[-1] > 0.0, every[-1], np.inf)  # no pass, no damage
-    turning, standing, damage = (power / turned for power in every[:-1])
+    every = {name: rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS}
+    turned = np.where(every[TURNED] > 0.0, every[TURNED], np.inf)  # no pass, no damage
+    turning, standing, damage = (every[f"load.{name}"] / turned for name in ("turning", "standing", "outer_damage"))
     places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
     return LoadPowers(turning=turning, standing=standing, outer_damage=damage, raceways=places)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract import BearingInfo, Manifest
-from ballpass.runtime.native.reduction_rows import LOAD_POWERS, SECTORS
+from ballpass.runtime.native.reduction_rows import LOAD_POWERS, POWERS, SECTORS, TURNED
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import ElementLife
@@ -170,7 +170,7 @@ def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> 
 
 def _needs(channel: str, readings: Sequence[str]) -> tuple[str, ...]:
     # what every place of the raceways has met needs no root of a load
-    powers = LOAD_POWERS[::3] if tuple(readings) == ("sectors",) else LOAD_POWERS
+    powers = (POWERS[0].name, TURNED) if tuple(readings) == ("sectors",) else LOAD_POWERS
     return tuple(channel.removesuffix("ball.force") + name for name in powers)
 
 

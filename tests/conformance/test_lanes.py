@@ -1,0 +1,142 @@
+"""Claims about lanes: a member of an ensemble is its single run to the last bit, in states and reductions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from parts import PARTS, Part, shipped
+
+from ballpass.derive import generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model, load
+from ballpass.runtime.contract.method_registry import METHODS
+from ballpass.runtime.native.reduction_rows import BALL_CHANNELS, JUMPS
+from ballpass.runtime.ratings.readings import KINDS as LIVES
+
+#: What is reduced of a channel.
+KINDS = ("max", "min", "peak_time", "min_time", "mean", "rms")
+WITH_BALLS = ("damping law", "rolling element", "effect")
+METHODS_OF_RUNS = tuple(f"stepper-{name}" for name in METHODS)
+
+FORTY_ROLLERS = shipped(
+    "varying_compliance",
+    ("[bearing]\n", '[bearing]\nelement = "cylindrical-roller"\n'),
+    ("balls = 8", "balls = 40"),
+    ('"33.5 mm"', '"110 mm"'),
+    ('stiffness = "13.34e9 N/m^1.5"', 'length = "8 mm"\nyoung_modulus = "207 GPa"\npoisson_ratio = 0.3'),
+    ('law = "none"', 'law = "tangent"\nratio = "0.25e-5 s"'),
+)
+
+
+def bearings_on_a_shaft(balls: Sequence[int]) -> str:
+    """Bearings with so many balls each."""
+    text = shipped("varying_compliance", ('law = "none"', 'law = "one-sided"\ncoefficient = "683 N*s/m"'))
+    start, end = (text.index(mark) for mark in ("[bearing]", "[run]"))
+    named = [
+        re.sub(
+            r"^\[bearing(?=[.\]])",
+            f"[bearings.b{k}",
+            text[start:end].replace("balls = 8", f"balls = {count}"),
+            flags=re.M,
+        )
+        for k, count in enumerate(balls)
+    ]
+    outputs = re.sub(r"outputs = \[.*?\]", 'outputs = ["b*"]', text[end:], flags=re.S)
+    return text[:start] + "".join(named) + outputs
+
+
+@pytest.fixture(scope="module")
+def model_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Model]:
+    def make(text: str) -> Model:
+        folder: Path = tmp_path_factory.mktemp("lanes") / "scene"
+        return load(generate(scene_from_text(text, "scene"), folder))
+
+    return make
+
+
+def observables(model: Model) -> list[str]:
+    """All that lanes reduce: states, the channels of the balls of each bearing, its lives."""
+    states, bearings = [state.name for state in model.manifest.states], model.manifest.bearings
+    of_balls = [
+        bearing.prefix + name
+        for bearing in bearings
+        for name in BALL_CHANNELS
+        if bearing.damping.acts or name != "ball.damping_force"
+    ]
+    return [
+        *(f"end:{name}" for name in states),
+        *(f"{kind}:{name}" for name in (*states, *of_balls) for kind in KINDS),
+        *(f"peak_ball:{name}" for name in of_balls),
+        *(bearing.prefix + life for bearing in bearings for life in LIVES),
+    ]
+
+
+def differing(model: Model, method: str, cycles: float) -> list[str]:
+    """What of three members in lanes is not the bits of their single runs."""
+    name = next((p for p in model.parameters if p.endswith("clearance")), [*model.parameters][-1])
+    table, names = {name: model.parameters[name] * np.array([0.9, 1.0, 1.15])}, observables(model)
+    given = {"cycles": cycles, "transient": 0.25 * cycles, "rtol": 1e-5, "method": method, "kinks": "stepped-over"}
+    single, lanes = (model.simulate_many(table, names, lanes=lanes, **given) for lanes in (False, True))  # type: ignore[arg-type]
+    assert (single.statistics.lanes, lanes.statistics.lanes) == (1, model.ensemble_driver.lanes)
+    assert not single.failures
+    assert (single.statistics.steps, single.statistics.rejected) == (lanes.statistics.steps, lanes.statistics.rejected)
+    return [name for name in names if not np.array_equal(single[name], lanes[name], equal_nan=True)]
+
+
+@pytest.mark.parametrize("method", METHODS_OF_RUNS)
+def test_members_of_the_press_are_single_runs_to_the_bit(make_model: Callable[..., Model], method: str) -> None:
+    model = make_model("punching_press")
+    assert len(observables(model)) > 80
+    assert differing(model, method, 1.5) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", [p for p in PARTS if p.registry in WITH_BALLS], ids=str)
+def test_members_with_any_part_are_single_runs_to_the_bit(part: Part, model_of: Callable[[str], Model]) -> None:
+    model = model_of(part.text)
+    assert {m: differing(model, m, 0.3) for m in ("stepper-dp54", "stepper-rodas5p")} == {
+        "stepper-dp54": [],
+        "stepper-rodas5p": [],
+    }
+
+
+@pytest.mark.long
+def test_forty_rollers_in_lanes_are_those_of_single_runs(model_of: Callable[[str], Model]) -> None:
+    """And what is reduced of them is that of samples."""
+    model = model_of(FORTY_ROLLERS)
+    assert {method: differing(model, method, 0.3) for method in METHODS_OF_RUNS} == {
+        method: [] for method in METHODS_OF_RUNS
+    }
+    run = {"transient": 0, "rtol": 1e-8, "method": "stepper-dp54", "kinks": "stepped-over"}
+    samples = model.simulate(0.3, samples_per_cycle=100_000, outputs=["ball.force"], **run)  # type: ignore[arg-type]
+    force, found = samples["ball.force"].max(axis=1), model.reduce(0.3, **run)["ball.force"]  # type: ignore[arg-type]
+    assert found.maximum == pytest.approx(force.max(), rel=1e-6)
+    assert found.minimum == pytest.approx(force.min(), rel=1e-6)
+    weights = np.r_[0.5, np.ones(len(force) - 2), 0.5]
+    mean = np.average(force, weights=weights)
+    assert found.mean == pytest.approx(mean, rel=1e-6)
+    assert found.std == pytest.approx(np.sqrt(np.average((force - mean) ** 2, weights=weights)), rel=1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.extreme
+def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of: Callable[[str], Model]) -> None:
+    """And each is what it is alone."""
+    balls = [5 + k % 6 for k in range(20)]
+    model = model_of(bearings_on_a_shaft(balls))
+    assert differing(model, "stepper-dp54", 0.05) == []
+    run = {"transient": 0, "rtol": 1e-9, "method": "stepper-dp54", "kinks": "stepped-over"}
+    together = model.reduce(0.05, **run)  # type: ignore[arg-type]
+    for count in (5, 10):
+        alone = model_of(bearings_on_a_shaft([count])).reduce(0.05, **run)  # type: ignore[arg-type]
+        for k in (k for k in range(20) if balls[k] == count):
+            # means of what jumps within a step depend on where steps end
+            for channel in (*(name for name, jumps in JUMPS.items() if not jumps), "inner.x"):
+                one, other = together[f"b{k}.{channel}"], alone[f"b0.{channel}"]
+                expected = (one.maximum, one.minimum, one.mean, one.rms)
+                found = (other.maximum, other.minimum, other.mean, other.rms)
+                assert found == pytest.approx(expected, rel=0.0, abs=1e-6 * one.range), (k, channel)
