@@ -21,7 +21,7 @@ vary = [
     "loads.unbalance.mass=3 g:7 g",
     "bearing.inner_ring.damping=300 N*s/m:800 N*s/m",
 ]
-limit = "peak_ball_force <= 70 N"
+limit = "peak_ball_force <= 52 N"
 found = model.sobol(vary, "peak_ball_force", limit=limit, samples=256)
 print(found)
 
