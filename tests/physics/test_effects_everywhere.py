@@ -64,7 +64,7 @@ ALL = EFFECTS + SPALLS
     ids=["constant speed", "motor, outer ring on the crank"],
 )
 def test_powers_of_all_forces_are_the_change_of_the_kinetic_energy(text: str) -> None:
-    """Balls that roll over waves and edges turn the rings; without that torque the balance misses by percents."""
+    """Balls that roll over waves and edges turn the rings; without that power the balance misses by 2e-4."""
     derived = Derived(with_bearings(text), further=POWERS)
     machine, rng = Multibody(derived.scene, derived.points()), np.random.default_rng(3)
     for _ in range(3):
