@@ -12,7 +12,7 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
 from ballpass.runtime.show.short import ShortRepr
 
-SCHEMA = 5
+SCHEMA = 6
 FILE_NAME = "manifest.json"
 
 #: Last key of the file: sha256 of its text without this key.
