@@ -133,6 +133,7 @@ def test_wrong_requests_are_refused_with_exit_code_2(place: Path, arguments: lis
 
 def test_an_error_that_nothing_keeps_is_refused_with_exit_code_1(place: Path) -> None:
     arguments = ["--no-figures", "--error", "1e-8", "--of", "range_inner_y", "--set", "load.force.x=2 N"]
+    arguments += ["--set", "bearing.inner_ring.damping=1 N*s/m"]
     done = CliRunner().invoke(app, ["run", f"{NAME}.toml", *arguments])
     assert done.exit_code == 1, done.output
     assert "The best is" in done.output

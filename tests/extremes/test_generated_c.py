@@ -18,6 +18,7 @@ from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
+from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [
@@ -57,6 +58,7 @@ def test_no_warnings(folder: Path, tmp_path: Path) -> None:
     flags = ("-std=c99", "-march=native", "-fopenmp-simd", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-parameter")
     said = ""
     (tmp_path / METHOD_TABLES).write_text(method_tables(), encoding="utf-8")
+    (tmp_path / REDUCTION_TABLES).write_text(reduction_tables(), encoding="utf-8")
     for source in (*sorted(DRIVER.glob("*.c")), folder / "model.c"):
         for define in ("", "BALLPASS_SENSITIVITIES", "BALLPASS_REDUCTIONS") if source.name == "stepper.c" else ("",):
             defined = [f"-D{define}"] if define else []

@@ -323,7 +323,7 @@ def own_effects(psi: np.ndarray, turned: float) -> np.ndarray:
 def test_every_effect_is_that_of_an_own_model(make_model: Callable[..., Model]) -> None:
     """Waves, a thin roller, two spalls and slip: motion of the rotor against SciPy, 1e-8 of the motion."""
     model = make_model("varying_compliance", *ROLLER, ("[bearing.inner_ring]", EFFECTS))
-    run = model.simulate(cycles=0.3, transient=0, rtol=1e-12, samples_per_cycle=400)
+    run = model.simulate(cycles=0.3, transient=0, rtol=1e-13, samples_per_cycle=400)
     own = own_run(ROLLERS, 0.98 * CAGE, run.t, raised=own_effects)
     assert np.max(np.abs(run.x - own) / np.max(np.abs(own), axis=0)) < 1e-8
     plain = own_run(ROLLERS, CAGE, run.t)

@@ -22,6 +22,7 @@ from ballpass.runtime import IntegrationError, Model, Solution, load
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
+from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -56,6 +57,7 @@ def test_a_driver_without_bearings_has_no_arrays_without_entries(andrews: Model,
         pytest.skip("no gcc, whose warnings these are")
     warnings = [f"-Werror={name}" for name in ("array-bounds", "stringop-overflow", "sequence-point")]
     (tmp_path / METHOD_TABLES).write_text(method_tables(), encoding="utf-8")
+    (tmp_path / REDUCTION_TABLES).write_text(reduction_tables(), encoding="utf-8")
     places = [f"-I{place}" for place in (andrews.folder, DRIVER, tmp_path)]
     command = ["gcc", "-std=c99", "-O2", "-fopenmp-simd", *warnings, *places, "-DBALLPASS_REDUCTIONS", "-S"]
     subprocess.run([*command, "-o", os.devnull, str(DRIVER / "stepper.c")], check=True)

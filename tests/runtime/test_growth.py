@@ -108,8 +108,9 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     code, shown, said = ballpass("run", PRESS, *wide, *turns)
     assert code == 0
     assert "amplifies small errors" in said
-    (row,) = [line for line in shown.splitlines() if line.strip().startswith("Inner ring, x")]
-    assert row.count("±") == 3
+    lines = shown.splitlines()
+    (row,) = [k for k, line in enumerate(lines) if line.strip().startswith("Inner ring, x")]
+    assert lines[row + 1].count("±") == 3  # below their numbers
     (force,) = [line for line in shown.splitlines() if line.strip().startswith("Torque of the")]
     assert "±" not in force
     code, shown, said = ballpass("run", PRESS, "--no-figures")

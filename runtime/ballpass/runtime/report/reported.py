@@ -26,7 +26,7 @@ class Reported:
         Examples
         --------
         >>> model.linearize(crank_angle=4.2).report().parts[0].heads[:3]
-        ('f, Hz', 'damped, Hz', 'ratio')
+        ('natural\\n[Hz]', 'damped\\n[Hz]', 'damping\\nratio')
         """
         return self._report()
 
