@@ -172,8 +172,8 @@ def test_no_sample_costs_any_python(make_model: ModelMaker, scene: str) -> None:
 
 def test_no_segment_costs_any_python(press: Model) -> None:
     press.simulate(1)
-    few, many = (python_calls(lambda n=n: press.simulate(n, samples_per_cycle=10)) for n in (12, 36))
-    # a call of the stepper takes many segments
+    few, many = (python_calls(lambda n=n: press.simulate(n, samples_per_cycle=10)) for n in (12, 20))
+    # a call of the stepper takes many segments; both runs have more than magnitudes look at, and fit one call
     assert many == few
 
 
