@@ -153,7 +153,9 @@ SCENES = (
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "scene", [pytest.param(s, marks=[] if s in ("punching_press", "rotor") else pytest.mark.extreme) for s in SCENES]
+)
 def test_peaks_of_scenes_without_a_run_are_those_of_the_steady_machine(
     scene: str, scene_text: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def _bound(model: Model, truth: dict[str, float], output: str, noise: float, tim
 
 
 @pytest.mark.long
+@pytest.mark.extreme
 def test_intervals_hold_the_truth_as_often_as_they_say_and_are_as_narrow_as_they_can_be(press: Model) -> None:
     """100 trials of damping, clearance and housing stiffness, with noise of 1 to 10 % of the signal."""
     times = np.arange(601) / 5e3
