@@ -771,12 +771,12 @@ def test_a_driver_at_constant_speed_takes_its_speed_as_an_input(
             one.set(**{SPEED: speed + 10.0})
             one.slave.doStep(0.0, 0.1)
             assert one.get("der(driver.speed)")[0] == pytest.approx((speed + 10.0 - model.parameters[SPEED]) / 0.1)
-    waviness = '[bearing.inner_waviness]\n8 = { amplitude = "1 um", phase = "0 deg" }\n\n[bearing.damping]'
-    Path("press.toml").write_text(scene_text("punching_press", ("[bearing.damping]", waviness)), encoding="utf-8")
+    slip = '[bearing.cage]\nslip = { time = ["0 s", "0.5 s"], value = [0.0, 0.04] }\n\n[bearing.damping]'
+    Path("press.toml").write_text(scene_text("punching_press", ("[bearing.damping]", slip)), encoding="utf-8")
     refused = CliRunner().invoke(app, command)
     assert refused.exit_code == 2
     assert "input 'mechanism.driver.speed': with a speed that changes" in refused.stderr
-    assert "delete inner_waviness" in refused.stderr
+    assert "slip" in refused.stderr
 
 
 @pytest.mark.long

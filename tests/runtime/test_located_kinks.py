@@ -260,7 +260,7 @@ def test_machines_of_all_kinds_end_and_agree_with_a_second_method(make_model: Ma
     scenes = {name: value for name, value in model.numbers().values.items() if name in VARIED}
     given = {"cycles": 1, "transient": 0, "outputs": [], "samples_per_cycle": 50}
     told = 0
-    for _ in range(6):
+    for _ in range(10):
         parameters = {name: value * VARIED[name] ** rng.uniform(-1.0, 1.0) for name, value in scenes.items()}
         for method in ("stepper", "stepper-dp54", "stepper-dop853"):
             rtol = float(10.0 ** rng.uniform(-10.0, -3.0))

@@ -18,7 +18,16 @@ import ballpass.runtime
 from ballpass.derive import derive, equations
 from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import DataSetReport, Distribution, MemberFailure, Model, QuantityFunction, Results, SignalClass
+from ballpass.runtime import (
+    DataSetReport,
+    Distribution,
+    MemberFailure,
+    Model,
+    QuantityFunction,
+    Results,
+    Sensor,
+    SignalClass,
+)
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, spectrogram
 from ballpass.runtime.certify.method_choice import MethodChoice
@@ -65,7 +74,7 @@ def shown(rotor: Model, scene_text: Callable[..., str]) -> dict[str, Any]:
         *(model.linearize(), model.linearize().modes[0], model.jacobian_function("rhs"), model.library),
         *(amplitude_spectrum(t, x), power_spectrum(t, x), spectrogram(t, x, segment=0.02), diagnosis(x)),
         *(model.refine_peak(solution, "inner.x"), solution.reductions["inner.x"]),
-        *(Signals(outputs=("inner.x",), sample_rate=1e4, duration=0.1), Distribution(name="norm")),
+        *(Signals(outputs=("inner.x",), sample_rate=1e4, duration=0.1), Distribution(name="norm"), Sensor(noise=0.1)),
         SignalClass(label="sound", model=model, members=9, parameters={f"a{k}": float(k) for k in range(1000)}),
         DataSetReport(path=Path("set.zarr"), members=9, made=9, failures=(MISSING,) * 1000),
         *(MISSING, Results(solution=solution, summary={"parameters": {f"a{k}": k for k in range(1000)}})),

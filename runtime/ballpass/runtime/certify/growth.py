@@ -119,9 +119,10 @@ class Growth(ShortRepr):
         if not self.uncertain:
             return ""
         worst = max(self.uncertain, key=lambda name: self.changes[name])
+        others = [name for name in self.uncertain if name != worst]
         return (
             f"the motion amplifies small errors: a start moved by {self.moved:g} of the motion changes "
-            f"{', '.join(self.uncertain)}, {worst} by {100.0 * self.changes[worst]:.2g} %. Single extremes of such a "
+            f"{', '.join([*others, worst])} by {100.0 * self.changes[worst]:.2g} %. Single extremes of such a "
             "motion have no digits, and another tolerance gives other ones. Take statistics over many turns or many "
             "starts, or a shorter run."
         )
