@@ -320,6 +320,7 @@ def own_effects(psi: np.ndarray, turned: float) -> np.ndarray:
     return added
 
 
+@pytest.mark.long
 def test_every_effect_is_that_of_an_own_model(make_model: Callable[..., Model]) -> None:
     """Waves, a thin roller, two spalls and slip: motion of the rotor against SciPy, 1e-8 of the motion."""
     model = make_model("varying_compliance", *ROLLER, ("[bearing.inner_ring]", EFFECTS))

@@ -121,7 +121,7 @@ COMMANDS = (
 )
 
 
-@pytest.mark.parametrize("words", COMMANDS)
+@pytest.mark.parametrize("words", [COMMANDS[0], *(pytest.param(c, marks=pytest.mark.long) for c in COMMANDS[1:])])
 def test_commands_warn_of_an_extreme_in_its_first_turns(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,7 +135,7 @@ def test_commands_warn_of_an_extreme_in_its_first_turns(
     assert "(ball.force)" in said
 
 
-@pytest.mark.parametrize("words", ["run SCENE --no-figures", "life SCENE"])
+@pytest.mark.parametrize("words", [pytest.param("run SCENE --no-figures", marks=pytest.mark.long), "life SCENE"])
 def test_commands_warn_where_no_transient_is_found(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a hundredth of the damping a search of a second does not reach the steady machine."""
     monkeypatch.chdir(tmp_path)

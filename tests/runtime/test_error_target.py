@@ -113,7 +113,7 @@ def test_errors_that_come_from_the_whole_run_are_seen(
             *("punching_press_tangent", {SPEED: 600.0 * math.tau / 60.0, CLEARANCE: 60e-6}, 12.0, "range_inner_x"),
             marks=pytest.mark.long,
         ),
-        ("four_bar", {CLEARANCE: 200e-6}, 6.0, PEAK),
+        pytest.param("four_bar", {CLEARANCE: 200e-6}, 6.0, PEAK, marks=pytest.mark.long),
         pytest.param("offset_slider", CONFINED, 14.0, "range_inner_x", marks=[pytest.mark.long, pytest.mark.extreme]),
     ],
 )

@@ -58,6 +58,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say_and_are_as_narrow_as_they
     assert np.all(np.abs(np.mean(narrow, axis=0) - 1.0) < 0.2), np.mean(narrow, axis=0)
 
 
+@pytest.mark.long
 def test_a_fit_is_within_the_noise_of_the_truth_and_the_profile_agrees(press: Model) -> None:
     times = np.arange(601) / 5e3
     found = press.fit(_data(press, TRUTH, "outer.y", 0.02, 5, times), VARY, profile=True, progress=False)

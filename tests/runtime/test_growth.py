@@ -57,6 +57,7 @@ def test_a_law_whose_force_jumps_is_no_exception(make_model: Callable[..., Model
     assert "inner.x" in model.growth(12, parameters=wide).uncertain
 
 
+@pytest.mark.long
 def test_an_ensemble_marks_the_members_that_single_runs_differ_in(press: Model) -> None:
     clearances = np.linspace(5e-6, 65e-6, 7)
     of = ["range_inner_x", "peak_ball_force"]
@@ -97,6 +98,7 @@ def test_members_that_one_moved_start_shares_by_luck_are_marked(press: Model) ->
     assert np.flatnonzero(off & ~marked).tolist() == []
 
 
+@pytest.mark.long
 def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 

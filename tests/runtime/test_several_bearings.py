@@ -82,7 +82,11 @@ def test_each_moves_as_it_does_alone(pair: Model, alone: dict[str, Model], metho
 
 @pytest.mark.parametrize(
     ("count", "changes"),
-    [(7, OTHER[3:]), pytest.param(5, (), marks=pytest.mark.long), pytest.param(20, OTHER[3:], marks=pytest.mark.long)],
+    [
+        pytest.param(7, OTHER[3:], marks=pytest.mark.long),
+        pytest.param(5, (), marks=pytest.mark.long),
+        pytest.param(20, OTHER[3:], marks=pytest.mark.long),
+    ],
     ids=lambda value: f"{value} bearings" if isinstance(value, int) else "fixed" if value else "elastic",
 )
 def test_bearings_alike_read_alike_however_many_there_are(

@@ -74,6 +74,7 @@ def test_wilson_covers_the_share_in_95_percent_of_samples() -> None:
     assert wilson(0, 10)[1] == pytest.approx(0.2775, abs=1e-4)  # a printed table
 
 
+@pytest.mark.long
 def test_failed_members_of_a_scene_leave_the_shares_as_they_are(make_model: Callable[..., Model]) -> None:
     """The crank's inertia acts nowhere; one in twenty is drawn below zero, which is refused."""
     press = make_model("punching_press_tangent")
@@ -89,6 +90,7 @@ def test_failed_members_of_a_scene_leave_the_shares_as_they_are(make_model: Call
     assert spoiled.quantities[0].shares[2].total == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.long
 def test_the_yield_is_the_share_of_a_fine_sweep_that_keeps_the_limit(make_model: Callable[..., Model]) -> None:
     press = make_model("punching_press_tangent")
     found = press.sobol(
