@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
-from ballpass.runtime.questions.fit import Fit
+from ballpass.runtime.questions.fit import FitAnswer
 
 RATIO, CLEARANCE, HOUSING = "bearing.damping.ratio", "bearing.clearance", "bearing.outer_ring.stiffness"
 VARY = (f"{RATIO}=1e-6 s:1e-5 s:log", f"{CLEARANCE}=5 um:30 um", f"{HOUSING}=30 MN/m:80 MN/m")
@@ -150,7 +150,7 @@ def test_several_trials_with_numbers_of_their_own_from_files(make_model: Callabl
 def test_accelerations_are_data_too(make_model: Callable[..., Model]) -> None:
     rotor = make_model("rotor")
     data = _data(rotor, {CLEARANCE: 7e-6}, "inner.ay", 0.05, 1, np.arange(400) / 5e3)
-    found: Fit = rotor.fit(data, f"{CLEARANCE}=2 um:15 um", progress=False)
+    found: FitAnswer = rotor.fit(data, f"{CLEARANCE}=2 um:15 um", progress=False)
     assert abs(found.numbers[0].value - 7e-6) < 3.0 * found.numbers[0].deviation < 1e-6
 
 

@@ -291,7 +291,7 @@ def determine(
     covariance = np.zeros((len(counts), len(counts)))
     if not len(free):
         return covariance, ()
-    sizes, widths = np.ones(len(free)), np.ones(len(free))
+    sizes = np.ones(len(free))
     for k, place in enumerate(free):
         one, value = misfit.unknowns[place], misfit.unknowns[place].value(float(counts[place]))
         if one.relative:
@@ -299,7 +299,7 @@ def determine(
     _, singular, rows = np.linalg.svd(jacobian[:, free] * sizes, full_matrices=False)
     blind = []
     for value, row in zip(singular, rows, strict=True):
-        reach = float(np.min(widths / np.maximum(np.abs(row) * sizes, 1e-300)))
+        reach = 1.0 / max(float(np.max(np.abs(row) * sizes)), 1e-300)  # ranges are 1 wide
         deviation = np.sqrt(factor) / value if value > 0.0 else np.inf
         if 4.0 * deviation >= reach:
             deviation = reach

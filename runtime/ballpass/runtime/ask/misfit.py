@@ -70,7 +70,7 @@ class Unknown:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Record:
+class SignalRecord:
     """A signal of a trial, without the samples that are missing.
 
     Attributes
@@ -133,7 +133,7 @@ class Misfit:
         self._begin, self._fixed, self._shifted = begin, dict(parameters), shift is not None
         units = {info.name: info.unit for info in (*model.manifest.states, *model.manifest.outputs)}
         self.records = tuple(
-            Record(
+            SignalRecord(
                 name=f"{output} of {trial.name}",
                 output=output,
                 unit=units[output],

@@ -212,7 +212,7 @@ class FittedSignal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Fit(ShortRepr, Reported):
+class FitAnswer(ShortRepr, Reported):
     """Parameters that fit measured signals best.
 
     Attributes
@@ -329,7 +329,7 @@ def _row(one: FittedNumber) -> tuple[str, ...]:
     return one.name, value, f"{one.deviation / one.factor:.3g}", f"{low} to {high}", one.shown_unit
 
 
-def _figures(_model: AnyModel, found: Fit, _parameters: object) -> Iterator[tuple[str, Figure]]:
+def _figures(_model: AnyModel, found: FitAnswer, _parameters: object) -> Iterator[tuple[str, Figure]]:
     from ballpass.runtime.plot.residuals import draw_residuals
 
     for k, one in enumerate(found.signals, start=1):
@@ -358,7 +358,7 @@ def fit(
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     progress: Progress = None,
-) -> Fit:
+) -> FitAnswer:
     """Find parameters from measured signals by least squares, with exact derivatives of the run.
 
     What the data do not determine is named, not given as a number. In Python, data may also be mappings with `time` and
@@ -461,7 +461,7 @@ def _answer(
     loss: str,
     profile: bool,
     rtol: float,
-) -> Fit:
+) -> FitAnswer:
     """The answer from the best search."""
     from ballpass.runtime.ask.fitting import profile_end
 
@@ -508,7 +508,7 @@ def _answer(
         for record, difference, noise in zip(misfit.records, best.differences, best.noise, strict=True)
     ]
     parts = len(misfit.ranges)
-    return Fit(
+    return FitAnswer(
         numbers=tuple(numbers),
         correlations=best.covariance / np.outer(sizes, sizes),
         undetermined=groups,
