@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from scripts.validation.lines import SpallLines, commit, committed, read_mfpt
+from scripts.validation.lines import SpallLines, asked, commit, committed, read_mfpt
 
 from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
@@ -49,11 +49,8 @@ def printed(rows: Sequence[SpallLines]) -> list[str]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    folders = [Path(one) for one in arguments if one != "--write"]
-    folder = folders[0] if folders else None
-    if "--write" in arguments:
-        if folder is None:
-            raise SystemExit("--write needs the folder of the recordings")
+    folder, write = asked(arguments)
+    if write:
         commit(TABLE, SOURCE, measured(folder))
     print("\n".join(printed(measured(folder))))
 

@@ -18,7 +18,7 @@ import numpy as np
 import xarray
 from scipy.io import loadmat
 from scipy.signal import decimate
-from scripts.validation.lines import BAND, FLOOR, HERE, Array, only
+from scripts.validation.lines import BAND, FLOOR, HERE, Array, asked, only
 from scripts.validation.spall_lines import SCENE, ball_pass
 from sklearn.ensemble import RandomForestClassifier
 from sklearn.metrics import confusion_matrix
@@ -176,9 +176,9 @@ def printed(seconds: Sequence[Second] | None = None) -> list[str]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    folders = [Path(one) for one in arguments if one != "--write"]
-    seconds = measured(folders[0] if folders else None)
-    if "--write" in arguments:
+    folder, write = asked(arguments)
+    seconds = measured(folder)
+    if write:
         with TABLE.open("w", encoding="utf-8", newline="") as file:
             file.write("".join(f"# {line}\n" for line in SOURCE.splitlines()))
             table = csv.writer(file, lineterminator="\n")

@@ -150,6 +150,15 @@ def only(folder: Path, pattern: str) -> Path:
     return found[0]
 
 
+def asked(arguments: Sequence[str]) -> tuple[Path | None, bool]:
+    """Folder of the recordings, None where none is given, and whether the table is to be written anew."""
+    folders = [Path(one) for one in arguments if one != "--write"]
+    write = "--write" in arguments
+    if write and not folders:
+        raise SystemExit("--write needs the folder of the recordings: give it, or omit --write.")
+    return (folders[0] if folders else None), write
+
+
 def committed(name: str) -> list[SpallLines]:
     """The table of a name beside this file, written by an earlier reading of the recordings."""
     with (HERE / name).open(encoding="utf-8", newline="") as file:

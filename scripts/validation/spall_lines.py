@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scripts.validation.lines import HERE, SpallLines, commit, committed, lines_of, read_cwru
+from scripts.validation.lines import HERE, SpallLines, asked, commit, committed, lines_of, read_cwru
 
 from ballpass.derive import generate
 from ballpass.runtime import load
@@ -114,11 +114,8 @@ def printed(found: Comparison) -> list[str]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    folders = [Path(one) for one in arguments if one != "--write"]
-    folder = folders[0] if folders else None
-    if "--write" in arguments:
-        if folder is None:
-            raise SystemExit("--write needs the folder of the recordings")
+    folder, write = asked(arguments)
+    if write:
         commit(TABLE, SOURCE, measured(folder))
     print("\n".join(printed(compare(folder))))
 
