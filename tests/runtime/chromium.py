@@ -84,11 +84,6 @@ class Page:
             assert time.monotonic() < end, f"{condition} never held; {self.complaints}"
             time.sleep(0.02)
 
-    def busy(self) -> float:
-        """Time that tasks of the page have taken [s]; of the processor where threadTicks were asked for."""
-        metrics = self.call("Performance.getMetrics")["metrics"]
-        return next(float(one["value"]) for one in metrics if one["name"] == "TaskDuration")
-
     def press(self, key: str, times: int = 1) -> None:
         """A key, where the focus is."""
         for _ in range(times):
