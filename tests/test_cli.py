@@ -198,22 +198,19 @@ def test_without_json_a_table_and_the_place_of_the_results_are_printed(
 
 
 @pytest.mark.usefixtures("refusing")
-@pytest.mark.parametrize(
-    "setting",
-    [
+def test_other_numbers_derive_nothing_and_compile_nothing(
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path
+) -> None:
+    numbers = (
         "bearing.clearance=20 um",
         "mechanism.bodies.rod.mass=3 kg",
         "mechanism.bodies.crank.points.B=7 mm",
         "mechanism.forces.punch.window.start=230 deg",
         "mechanism.driver.speed=600 rpm",
-    ],
-)
-def test_another_number_derives_nothing_and_compiles_nothing(
-    site: Site, ballpass: Callable[..., Result], tmp_path: Path, setting: str
-) -> None:
+    )
     before = contents(site.folder, site.cache)
-    words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path, "--set", setting)
-    result = ballpass(site.folder, *words)
+    words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path)
+    result = ballpass(site.folder, *words, *(word for number in numbers for word in ("--set", number)))
     assert result.exit_code == 0, result.stderr
     assert "deriving" not in result.stderr
     # not even rewritten with the same bytes: the times of the last change are compared as well

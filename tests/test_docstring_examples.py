@@ -25,6 +25,8 @@ import ballpass.runtime
 from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
 #: Of packages that not every installation has.
@@ -55,12 +57,9 @@ INTERNAL = {
     "Reductions.table_html",
     "SolutionPlot.__call__",
 }
-#: Of examples that take long, or need what not every installation has: ziglang, whose first page takes a minute.
+#: Of examples that need what not every installation has.
 MARKS = {
-    "Model.explore": (
-        pytest.mark.long,
-        pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed"),
-    )
+    "Model.explore": pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
 }
 #: Code of a page at 1280 pixels, and what is code.
 COLUMNS, EXAMPLE = 90, re.compile(r" *(>>>|\.\.\.) ")

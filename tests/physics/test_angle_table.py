@@ -86,7 +86,8 @@ def test_steps_end_at_the_knots_and_a_turn_has_each_of_them(shaper: Model) -> No
     np.testing.assert_allclose(times, [t for t in expected if 0.0 < t < 1.0], rtol=1e-14)
 
 
-@pytest.mark.parametrize("kinks", ["located", pytest.param("stepped-over", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kinks", ["located", "stepped-over"])
 def test_members_of_an_ensemble_are_single_runs(shaper: Model, kinks: str) -> None:
     table = {
         f"{TABLE}angle.3": np.radians([125.0, 130.0, 140.0]),

@@ -125,7 +125,13 @@ def pair(name: str) -> tuple[Derived, Multibody]:
     return derived, Multibody(derived.scene, derived.points())
 
 
-@pytest.mark.parametrize("name", list(CASES))
+#: Second cases of what another one has as well; their systems are large.
+SECOND = ("press, effects", "press, effects, run-up", "press, effects, outer ring on the crank", "drag link")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in SECOND else ()) for name in CASES]
+)
 def test_accelerations_and_reactions_are_those_of_absolute_coordinates_with_multipliers(name: str) -> None:
     """Reactions and the drive's torque come out of the balances of the bodies, forces of the balls and housings out of
     deflections, a motor's torque out of its law: that both are equal is a free check."""
@@ -174,7 +180,9 @@ def test_play_that_lets_a_linkage_reach_a_dead_centre_is_refused(ground: float, 
         derive(scene)
 
 
-@pytest.mark.parametrize("name", ["press, bearings in all hinges", "drag link", "Whitworth"])
+@pytest.mark.parametrize(
+    "name", ["press, bearings in all hinges", pytest.param("drag link", marks=pytest.mark.long), "Whitworth"]
+)
 def test_balls_roll_on_without_a_jump_over_several_turns(name: str) -> None:
     """Rods swing, couplers and levers turn: angles follow the integrated rate of pure rolling."""
     derived, machine = pair(name)

@@ -340,6 +340,7 @@ NEEDLES = (
 )
 
 
+@pytest.mark.long
 def test_needles_are_rollers(make_model: Callable[..., Model]) -> None:
     """A cage with needles by hand: motion against SciPy, ratings against the printed ones, life by the formula."""
     page = (Path(__file__).parents[2] / "docs" / "theory" / "rollers.md").read_text(encoding="utf-8")
@@ -404,6 +405,7 @@ def test_exponent_of_a_ball_gives_its_bits(
     assert np.array_equal(roller.x, ball.x)
 
 
+@pytest.mark.long
 def test_forty_rollers_are_those_of_an_own_model(make_model: Callable[..., Model]) -> None:
     """Forty thin rollers, more than lanes of any vector."""
     forty = ("balls = 8\n", 'element = "cylindrical-roller"\nballs = 40\n')

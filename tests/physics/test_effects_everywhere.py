@@ -59,7 +59,10 @@ ALL = EFFECTS + SPALLS
     "text",
     [
         press(bearing("A", elastic=True, count=2, effects=ALL)),
-        press(bearing("A", "frame", effects=ALL), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
+        pytest.param(
+            press(bearing("A", "frame", effects=ALL), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
+            marks=pytest.mark.long,
+        ),
     ],
     ids=["constant speed", "motor, outer ring on the crank"],
 )
@@ -217,7 +220,7 @@ HELD = (
 )
 
 
-@pytest.mark.parametrize("outer", [False, True])
+@pytest.mark.parametrize("outer", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_an_outer_ring_that_turns_carries_its_waves_and_spalls_with_it(
     make_virtual: Callable[..., Model], outer: bool
 ) -> None:

@@ -82,6 +82,7 @@ def test_steps_end_on_the_edges_of_windows(many: Model) -> None:
         assert np.min(np.abs(edges - math.radians(angle) / speed)) < 1e-13
 
 
+@pytest.mark.long
 def test_a_burst_gives_a_free_ring_its_impulse_and_a_verified_slope(make_model: Callable[..., Model]) -> None:
     """In a wide clearance the ring is free: m v = F (t2 - t1), and the distance changes with t1 as -F (T - t1)/m."""
     burst = '[load]\ntype = "constant"\nforce = ["8 N", "-3 N"]\ntime_window = { start = "2 ms", end = "5 ms" }\n'

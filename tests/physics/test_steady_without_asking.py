@@ -135,7 +135,8 @@ def test_commands_warn_of_an_extreme_in_its_first_turns(
     assert "(ball.force)" in said
 
 
-@pytest.mark.parametrize("words", [pytest.param("run SCENE --no-figures", marks=pytest.mark.long), "life SCENE"])
+@pytest.mark.long
+@pytest.mark.parametrize("words", ["run SCENE --no-figures", "life SCENE"])
 def test_commands_warn_where_no_transient_is_found(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a hundredth of the damping a search of a second does not reach the steady machine."""
     monkeypatch.chdir(tmp_path)

@@ -17,7 +17,7 @@ RISE = (WINDOW, 'window = { start = "237 deg", end = "267 deg", rise = "5 deg" }
 PATH = "mechanism.forces.punch.window"
 
 
-@pytest.mark.parametrize("scene", ["punching_press", "punching_press_motor"])
+@pytest.mark.parametrize("scene", ["punching_press", pytest.param("punching_press_motor", marks=pytest.mark.long)])
 def test_a_rise_is_a_table_with_four_knots(make_virtual: Callable[..., Model], scene: str) -> None:
     """At a constant speed and where the angle is a state; across zero degrees as well."""
     for start, end in ((237.0, 267.0), (350.0, 25.0)):

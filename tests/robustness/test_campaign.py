@@ -27,8 +27,10 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 NAMES = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
 BALLPASS = str(Path(sysconfig.get_path("scripts")) / "ballpass")
 
+pytestmark = pytest.mark.long
+
 #: Twenty commands or scenes each.
-SEEDS = [pytest.param(1, id="quick"), *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 11))]
+SEEDS = range(1, 11)
 
 #: What a command may take of its own processor time, however absurd it is [s].
 PATIENCE = 60.0
@@ -102,9 +104,7 @@ def mutant(draw: random.Random) -> str:
     return "\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items())
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(1, id="quick"), *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 11))]
-)
+@pytest.mark.parametrize("seed", SEEDS)
 def test_absurd_commands_end_in_words(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     draw = random.Random(seed)
@@ -112,9 +112,7 @@ def test_absurd_commands_end_in_words(seed: int, tmp_path: Path, monkeypatch: py
         ends_in_words(absurd_command(draw))
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(1, id="quick"), *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 11))]
-)
+@pytest.mark.parametrize("seed", SEEDS)
 def test_mutated_scenes_end_in_words(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     draw = random.Random(seed)

@@ -24,6 +24,8 @@ from ballpass.runtime.native import ensemble_driver, stepper
 from ballpass.runtime.native.compile import compile_sources, find_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 
+pytestmark = pytest.mark.long
+
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
 
