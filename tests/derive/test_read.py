@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import tomllib
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, fields, is_dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
 from ballpass.derive.emit.signature import source_key
@@ -275,107 +270,6 @@ def test_all_faults_of_other_values_are_raised_together() -> None:
         "bearing.share",
         "bearing.ball_diameter",
     ]
-
-
-# ------------------------------------------------------------------------------------------ any file, any mistake in it
-
-
-@given(
-    name=st.sampled_from(FILES),
-    factor=st.floats(min_value=0.999, max_value=1.0),
-    data=st.data(),
-)
-@settings(max_examples=40, deadline=None)
-def test_any_value_comes_back(name: str, factor: float, data: st.DataObject) -> None:
-    scene = read_scene(SCENES / f"{name}.toml")
-    quantity = data.draw(st.sampled_from(scene.quantities))
-    value = quantity.value * factor
-    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
-    path, read = parse_override(scene, f"{quantity.path}={value!r}{unit}")
-    assert read == pytest.approx(value, rel=1e-15)
-    held = values(with_values(scene, {path: read}))
-    assert held == {**values(scene), path: read}
-
-
-def places(table: dict[str, Any], path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-    found: list[tuple[str, ...]] = []
-    for key, value in table.items():
-        found.append((*path, key))
-        if isinstance(value, dict):
-            found += places(value, (*path, key))
-    return found
-
-
-def as_toml(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{as_toml(str(key))} = {as_toml(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(as_toml(item) for item in value) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = "".join(f"\\U{ord(character):08x}" if not character.isalnum() else character for character in value)
-        return f'"{escaped}"'
-    return '"none"' if value is None else repr(value)
-
-
-TREES = {name: tomllib.loads((SCENES / f"{name}.toml").read_text(encoding="utf-8")) for name in FILES}
-JUNK = st.recursive(
-    st.one_of(
-        st.none(),
-        st.booleans(),
-        st.integers(),
-        st.floats(),
-        st.text(alphabet=st.characters(exclude_categories=["Cs"]), max_size=8),
-        st.sampled_from(
-            ["6 mm", "0 kg", "-1 kg", "nan m", "500 rpm", "frame", "A", "crank", "fixed", "origin", "1e-6 s"]
-        ),
-    ),
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5).filter(str.isalnum), inner, max_size=2)
-    ),
-    max_leaves=5,
-)  # None deletes the key
-
-
-@given(name=st.sampled_from(FILES), data=st.data())
-@settings(max_examples=150, deadline=None)
-def test_a_scene_with_mistakes_is_read_or_refused_but_never_breaks(name: str, data: st.DataObject) -> None:
-    tree = copy.deepcopy(TREES[name])
-    for _ in range(data.draw(st.integers(1, 3))):
-        path = data.draw(st.sampled_from(places(tree)))
-        junk = data.draw(JUNK)
-        table = tree
-        for key in path[:-1]:
-            table = table[key]
-        if junk is None:
-            del table[path[-1]]
-        elif data.draw(st.booleans()):
-            table[path[-1]] = junk
-        else:
-            table[data.draw(st.sampled_from(["mass", "x", "points", "joint", "type"]))] = junk
-        if not tree:
-            break
-    text = "\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items())
-    refused: SceneError | None = None
-    try:
-        scene = scene_from_text(text, "mutant")
-    except SceneError as error:
-        refused = error
-    if refused is None:
-        assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
-    else:
-        assert all(fault.problem and fault.remedy for fault in refused.faults)
-
-
-@given(cut=st.integers(0, len(PRESS)), junk=st.text(alphabet="[]{}\"=.#\n' aA1", max_size=4))
-@settings(max_examples=100, deadline=None)
-def test_a_torn_file_is_read_or_refused_but_never_breaks(cut: int, junk: str) -> None:
-    try:
-        scene = scene_from_text(PRESS[:cut] + junk + PRESS[cut:], "torn")
-    except SceneError:
-        return
-    assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
 
 
 CUT = """[mechanism.forces.cut]

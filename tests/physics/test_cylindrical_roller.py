@@ -358,20 +358,6 @@ def test_needles_are_rollers(make_model: Callable[..., Model]) -> None:
     assert found.basic_life == pytest.approx(1e6 * (ratings.dynamic / LOAD) ** (10 / 3), rel=1e-3)
 
 
-def test_lanes_and_single_runs_agree(rotor: Model) -> None:
-    """Members of an ensemble are the runs of their parameters."""
-    clearances = [-2e-6, 0.0, 5e-6]
-    wanted = ["max:ball.force", "mean:ball.force", "life", "life_miner"]
-    table = {"bearing.clearance": np.array(clearances)}
-    many = rotor.simulate_many(table, wanted, cycles=0.4, transient=0.1, rtol=1e-8)
-    for k, clearance in enumerate(clearances):
-        one = rotor.simulate_many(
-            {"bearing.clearance": np.array([clearance])}, wanted, cycles=0.4, transient=0.1, rtol=1e-8
-        )
-        for name in wanted:
-            assert many[name][k] == one[name][0]
-
-
 @pytest.mark.long
 def test_sensitivities_are_verified(make_model: Callable[..., Model]) -> None:
     """Derivatives of a damped roller bearing, verified by the second route."""

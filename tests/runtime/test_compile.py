@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import shutil
-import stat
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +14,7 @@ import pytest
 from artefact import write_folder
 
 from ballpass.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
-from ballpass.runtime.native import compile, compilers
+from ballpass.runtime.native import compile
 
 # models made by hand here have no kernels
 pytestmark = pytest.mark.filterwarnings("ignore::ballpass.runtime.NoKernelsWarning")
@@ -121,19 +117,6 @@ def test_failing_compiler_is_loud_and_leaves_nothing(cache: Path, tmp_path: Path
     assert list(cache.iterdir()) == []
 
 
-def test_hanging_compiler_is_stopped(
-    cache: Path, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    script = tmp_path / "hanging-cc"
-    script.write_text("#!/bin/sh\nexec sleep 60\n")
-    script.chmod(0o755)
-    monkeypatch.setattr(compilers, "TIMEOUT", 0.2)
-    compiler = compile.Compiler(command=(str(script),), flags=(), identity="hanging")
-    with pytest.raises(CompileError, match=r"did not finish within 0\.2 s"):
-        compile.compile_sources((source,), compiler)
-    assert list(cache.iterdir()) == []
-
-
 def test_interrupted_compile_leaves_nothing(
     cache: Path, source: Path, counting: tuple[compile.Compiler, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,18 +143,6 @@ def test_cc_variable_with_arguments_is_used(monkeypatch: pytest.MonkeyPatch) -> 
     found = compile.find_compiler()
     assert found is not None
     assert found.command[1:] == ("-DX=1",)
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_unwritable_cache_warns_and_compiles_elsewhere(cache: Path, source: Path) -> None:
-    cache.mkdir()
-    cache.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    compiler = compile.find_compiler()
-    assert compiler is not None
-    with pytest.warns(CacheWarning, match=compile.CACHE_VARIABLE):
-        library = compile.compile_sources((source,), compiler)
-    assert library.path.exists()
-    assert library.path.parent != cache
 
 
 def test_cache_that_is_no_folder_warns_and_compiles_elsewhere(cache: Path, source: Path) -> None:
@@ -202,24 +173,6 @@ def test_changed_number_recompiles_nothing_and_changed_structure_does(
     point = {"t": 0.0, "x": [0.1, 0.2], "u": [0.0] * 4, "p": list(first.parameters.values()), "c": [2.0]}
     # the changed file is used although the first library is still open in this process
     np.testing.assert_allclose(changed.kernel("rhs")(point) - first.kernel("rhs")(point), [0.0, 0.5], rtol=1e-12)
-
-
-def test_two_processes_loading_at_once_both_get_a_whole_library(cache: Path, tmp_path: Path) -> None:
-    folder = write_folder(tmp_path / "model")
-    code = (
-        "import sys; from ballpass.runtime import load; m = load(sys.argv[1]); "
-        "print(m.simulate(cycles=0.2, method='cvodes').x[-1].tobytes().hex())"
-    )
-    running = [
-        subprocess.Popen([sys.executable, "-W", "error", "-c", code, str(folder)], stdout=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    answers = [process.communicate(timeout=300)[0] for process in running]
-    assert [process.returncode for process in running] == [0, 0]
-    assert answers[0] == answers[1] != ""
-    names = [path.name for path in cache.iterdir()]
-    assert len([name for name in names if name.startswith("oscillator-")]) == 1
-    assert not [name for name in names if name.startswith(".")]
 
 
 def test_without_compiler_the_virtual_machine_gives_the_same_results_and_a_warning_names_the_cost(

@@ -173,18 +173,6 @@ def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker
     assert same(located, model.simulate_many(columns, ["rms:inner.y"], cycles=1, transient=0, lanes=False))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-rodas5p"])
-def test_lanes_serve_balls_without_an_opposite_one(make_model: ModelMaker, method: str) -> None:
-    """An odd number of balls has no pairs that share a direction."""
-    model, columns = make_model("punching_press", ("balls = 8 ", "balls = 7 ")), table(3)
-    result = model.simulate_many(columns, ["max:ball.force", "rms_inner_y"], cycles=1, transient=0, method=method)
-    for k in range(3):
-        single = model.reduce(1, transient=0, method=method, parameters=member(columns, k))
-        assert result["max:ball.force"][k] == pytest.approx(single["ball.force"].maximum, rel=1e-4)
-        assert result["rms_inner_y"][k] == pytest.approx(single["inner.y"].rms, rel=1e-4)
-
-
 def test_results_are_the_same_bits_for_any_number_of_threads(make_model: ModelMaker) -> None:
     model, columns = press(make_model), table(150)
     results = [
@@ -291,13 +279,6 @@ def test_an_error_in_the_callers_progress_is_the_callers(make_model: ModelMaker)
 
     with pytest.raises(ZeroDivisionError):
         press(make_model).simulate_many(table(60), ["max:ball.force"], cycles=1, transient=0, progress=fail)
-
-
-def test_progress_ends_at_one(make_model: ModelMaker) -> None:
-    told: list[float] = []
-    press(make_model).simulate_many(table(60), ["max:ball.force"], cycles=1, transient=0, progress=told.append)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
 
 
 def test_tables_of_three_forms_are_one_ensemble(make_model: ModelMaker) -> None:

@@ -29,16 +29,10 @@ def test_refined_peak_equals_that_of_the_reduction_at_equal_tolerance(
     assert peak.searched == "every step"
 
 
-def test_summary_tells_the_peak_that_the_reduction_finds(make_model: ModelMaker) -> None:
-    model = make_model("punching_press")
-    found = summarize(model, model.simulate(3, transient=1))["peak_ball_force"]
-    reduced = model.reduce(3, transient=1)
-    assert found["total"] == reduced["ball.force"].maximum
-
-
-def test_the_summary_has_the_motions_of_the_reduction(make_model: ModelMaker) -> None:
+def test_the_summary_has_motions_and_peak_of_the_reduction(make_model: ModelMaker) -> None:
     model = make_model("punching_press")
     told, reduced = summarize(model, model.simulate(3, transient=1)), model.reduce(3, transient=1)
+    assert told["peak_ball_force"]["total"] == reduced["ball.force"].maximum
     for name in model.states:
         found = reduced[name]
         assert (told[name]["min"], told[name]["max"]) == (found.minimum, found.maximum)
@@ -122,16 +116,6 @@ def test_a_spike_between_samples_is_found_wherever_it_is(make_model: ModelMaker,
     assert peak.value == pytest.approx(
         model.reduce(4, transient=2, parameters=parameters)["ball.force"].maximum, rel=1e-8
     )
-
-
-def test_the_summary_tells_a_spike_between_samples_and_where_was_looked(make_model: ModelMaker) -> None:
-    model = make_model("offset_slider")
-    told = summarize(model, model.simulate(4, transient=2, parameters=SPIKES[0]))["peak_ball_force"]
-    reduced = model.reduce(4, transient=2, parameters=SPIKES[0])
-    for key, name in (("total", "ball.force"), ("elastic", "ball.elastic_force")):
-        assert told[key] == pytest.approx(reduced[name].maximum, rel=1e-8)
-        assert told["ball"][key] == reduced[name].maximum_ball
-    assert told["searched"] == {"elastic": "every step", "total": "every step"}
 
 
 @pytest.mark.parametrize(("method", "kind"), [("cvodes", "max"), ("stepper", "min")])

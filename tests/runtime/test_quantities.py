@@ -6,12 +6,10 @@ import math
 import re
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
-from ballpass.runtime.quantity.registry import KINDS
 
 ENSEMBLE = [
     "peak_ball_force",
@@ -72,14 +70,6 @@ def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_mode
     assert report.quantities[1].value == pytest.approx(work / speed, rel=1e-9)
     assert report["integral:drive_torque", names[0]].derivative == pytest.approx(work / force / speed, rel=1e-8)
     assert report["integral:drive_torque", names[3]].dimensionless == pytest.approx(-1.0, abs=1e-10)
-
-
-def test_an_unloaded_press_does_no_work(make_model: Callable[..., Model]) -> None:
-    model = make_model("punching_press")
-    off = {"mechanism.forces.punch.force.y": 0.0}
-    report = model.sensitivity("drive_work", "mechanism.gravity", 1, transient=0, parameters=off, check=False)
-    assert abs(report.quantities[0].value) < 1e-9
-    assert abs(report.pairs[0].derivative) < 1e-9
 
 
 def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[..., Model]) -> None:
@@ -229,21 +219,6 @@ def test_parameters_are_chosen_by_patterns_too(make_model: Callable[..., Model])
         model.sensitivity("static_deflection", "bering.*", check=False)
 
 
-def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]) -> None:
-    model = make_model("punching_press")
-    names = {
-        "value": "value:inner.y@240deg",
-        "amplitude": "amplitude:inner.y@bpfo",
-        "drive_work": "drive_work",
-        "static_deflection": "static_deflection@250deg",
-        "static_peak_ball_force": "static_peak_ball_force@250deg",
-    }
-    asked = [names.get(name, name if kind.takes == "bearing" else f"{name}:inner.y") for name, kind in KINDS.items()]
-    found = values(model, asked, cycles=1, transient=0)
-    assert all(np.isfinite(number) for number in found.values())
-    assert all(kind.summary for kind in KINDS.values())
-
-
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -258,14 +233,3 @@ def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]
 def test_quantities_have_words_for_figures(make_model: Callable[..., Model], name: str, words: str) -> None:
     manifest = make_model("punching_press").manifest
     assert quantity_words(manifest, parse_quantity(manifest, name)) == words
-
-
-def test_drive_work_equals_the_work_of_the_punch(make_model: Callable[..., Model]) -> None:
-    """By virtual work: force times the slider's way within the window; masses take as much as they give in a turn."""
-    model = make_model("punching_press")
-    at = {name.rpartition("mechanism.")[2]: value for name, value in model.parameters.items()}
-    crank, rod = 6e-3, 100e-3
-    window = [at[f"forces.punch.window.{end}"] for end in ("start", "end")]
-    high, low = (crank * np.sin(angle) - np.sqrt(rod**2 - (crank * np.cos(angle)) ** 2) for angle in window)
-    work = at["forces.punch.force.y"] * abs(high - low)
-    assert values(model, ["drive_work"], cycles=3, transient=1)["drive_work"] == pytest.approx(work, rel=1e-9)

@@ -237,14 +237,6 @@ def test_memory_does_not_grow_with_the_run(make_model: ModelMaker) -> None:
     assert peaks[1] < 1.5 * peaks[0] + 100_000, peaks
 
 
-def test_progress_is_told_and_ends_at_one(make_model: ModelMaker) -> None:
-    told: list[float] = []
-    press(make_model, "stiff").reduce(cycles=700, transient=1, rtol=1e-4, progress=told.append)
-    assert told == sorted(told)
-    assert len(told) > 2
-    assert told[-1] == 1.0
-
-
 def test_a_channel_without_damping_law_has_no_damping_force(make_model: ModelMaker) -> None:
     model = make_model("varying_compliance")
     found = model.reduce(cycles=1, transient=0)
