@@ -247,22 +247,18 @@ def test_set_equals_the_same_value_in_the_file(site: Site, ballpass: Callable[..
 
 # --------------------------------------------------------------------------------------------------- wrong scene files
 
-WRONG = [
-    ("missing unit", 'clearance = "10 um"', 'clearance = "10"', ("bearing.clearance", "unit is missing")),
-    ("wrong dimension", 'clearance = "10 um"', 'clearance = "10 kg"', ("bearing.clearance", "dimension", "length")),
-    ("unknown key", 'clearance = "10 um"', 'clearence = "10 um"', ("bearing.clearence", 'did you mean "clearance"')),
-    ("negative mass", 'mass = "2.55 kg"', 'mass = "-2.55 kg"', ("mechanism.bodies.rod.mass", "-2.55 kg", "above zero")),
-    ("locks", 'C = "100 mm"', 'C = "4 mm"', ("cannot be assembled at joint C", "crank angle", "rod")),
-    ("unknown body", 'bodies = ["crank", "rod"]', 'bodies = ["crank", "rood"]', ("mechanism.joints.B", "rood", "rod")),
-    ("NaN", 'clearance = "10 um"', 'clearance = "nan um"', ("bearing.clearance", "nan um", "finite")),
-    ("unknown output", '"drive_torque"]', '"inner.z"]', ("run.outputs", "inner.z", "inner.x")),
-    ("not TOML", "[bearing]", "[bearing", ("not TOML",)),
-]
 
-
-@pytest.mark.parametrize(("name", "old", "new", "words"), WRONG, ids=[case[0] for case in WRONG])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [  # found when text is read, when values are checked, when the linkage is derived
+        ("[bearing]", "[bearing", ("not TOML",)),
+        ('clearance = "10 um"', 'clearence = "10 um"', ("bearing.clearence", 'did you mean "clearance"')),
+        ('C = "100 mm"', 'C = "4 mm"', ("cannot be assembled at joint C", "crank angle", "rod")),
+        ('"drive_torque"]', '"inner.z"]', ("run.outputs", "inner.z", "inner.x")),
+    ],
+)
 def test_wrong_scene_is_refused_in_words_and_nothing_is_written(
-    ballpass: Callable[..., Result], tmp_path: Path, name: str, old: str, new: str, words: tuple[str, ...]
+    ballpass: Callable[..., Result], tmp_path: Path, old: str, new: str, words: tuple[str, ...]
 ) -> None:
     assert PRESS.count(old) == 1
     scene = tmp_path / "wrong.toml"
@@ -271,15 +267,6 @@ def test_wrong_scene_is_refused_in_words_and_nothing_is_written(
         result = ballpass(tmp_path, subcommand, scene)
         says_no(result, str(scene), *words, "given:", "allowed:", "remedy:")
         assert list(tmp_path.iterdir()) == [scene]
-
-
-def test_all_faults_of_a_scene_are_told_at_once(ballpass: Callable[..., Result], tmp_path: Path) -> None:
-    scene = tmp_path / "wrong.toml"
-    text = PRESS.replace('clearance = "10 um"', 'clearance = "10"').replace('mass = "2.55 kg"', 'mass = "-1 kg"')
-    scene.write_text(text, encoding="utf-8")
-    clearance, mass = (text[: text.index(key)].count("\n") + 1 for key in ('clearance = "10"', 'mass = "-1 kg"'))
-    result = ballpass(tmp_path, "run", scene)
-    says_no(result, "2 faults", f"bearing.clearance (line {clearance})", f"mechanism.bodies.rod.mass (line {mass})")
 
 
 def test_empty_and_missing_files_are_refused_by_the_process(site: Site, tmp_path: Path) -> None:
@@ -299,35 +286,26 @@ def test_empty_and_missing_files_are_refused_by_the_process(site: Site, tmp_path
 
 # ------------------------------------------------------------------------------------------------------ wrong requests
 
-REFUSED = [
-    (
-        "unknown parameter",
-        ("--set", "bearing.clearence=20 um"),
-        ("bearing.clearence", 'did you mean "bearing.clearance"'),
-    ),
-    ("no unit", ("--set", "bearing.clearance=20"), ("--set", "bearing.clearance", "unit is missing", "remedy:")),
-    ("wrong dimension", ("--set", "bearing.clearance=20 kg"), ("bearing.clearance", "20 kg", "remedy:")),
-    ("NaN", ("--set", "bearing.clearance=nan um"), ("bearing.clearance", "finite")),
-    ("negative mass", ("--set", "mechanism.bodies.rod.mass=-1 kg"), ("mechanism.bodies.rod.mass", "above zero")),
-    ("no value", ("--set", "bearing.clearance"), ("PATH=VALUE",)),
-    ("structure", ("--set", "bearing.balls=9"), ("bearing.balls", "change it in the scene file")),
-    ("two faults", ("--set", "a=1 m", "--set", "bearing.clearance=1"), ("2 faults", "a:", "bearing.clearance")),
-    ("method", ("--method", "runge"), ("'runge'", "auto, stepper", "cvodes")),
-    ("tolerance", ("--rtol", "5"), ("--rtol", "5", "1e-13 to 0.1")),
-    ("tolerance NaN", ("--rtol", "nan"), ("--rtol", "nan", "1e-13 to 0.1")),
-    ("no cycles", ("--cycles", "0"), ("--cycles", "above 0")),
-    ("infinite cycles", ("--cycles", "inf"), ("--cycles", "above 0")),
-    ("all transient", ("--cycles", "2"), ("2 transient", "--transient 0")),
-    ("negative transient", ("--transient", "-1"), ("--transient", "from 0 on")),
-    ("no number", ("--cycles", "many"), ("--cycles", "number")),
-    ("unknown option", ("--cycle", "3"), ("--cycle", "--cycles")),
-    ("file in the way", ("--out", "file/results"), ("file/results", "cannot be written", "--out DIR")),
-]
 
-
-@pytest.mark.parametrize(("name", "words", "said"), REFUSED, ids=[case[0] for case in REFUSED])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--set", "a=1 m", "--set", "bearing.clearance=1"), ("2 faults", "a:", "bearing.clearance", "remedy:")),
+        (("--set", "mechanism.bodies.rod.mass=-1 kg"), ("mechanism.bodies.rod.mass", "above zero")),
+        (("--method", "runge"), ("'runge'", "auto, stepper", "cvodes")),
+        (("--rtol", "5"), ("--rtol", "5", "1e-13 to 0.1")),
+        (("--rtol", "nan"), ("--rtol", "nan", "1e-13 to 0.1")),
+        (("--cycles", "0"), ("--cycles", "above 0")),
+        (("--cycles", "inf"), ("--cycles", "above 0")),
+        (("--cycles", "2"), ("2 transient", "--transient 0")),
+        (("--transient", "-1"), ("--transient", "from 0 on")),
+        (("--cycles", "many"), ("--cycles", "number")),
+        (("--cycle", "3"), ("--cycle", "--cycles")),
+        (("--out", "file/results"), ("file/results", "cannot be written", "--out DIR")),
+    ],
+)
 def test_wrong_request_is_refused_before_anything_is_written(
-    ballpass: Callable[..., Result], tmp_path: Path, name: str, words: tuple[str, ...], said: tuple[str, ...]
+    ballpass: Callable[..., Result], tmp_path: Path, words: tuple[str, ...], said: tuple[str, ...]
 ) -> None:
     (tmp_path / "file").touch()
     result = ballpass(tmp_path, "run", SCENES / "punching_press.toml", *words)

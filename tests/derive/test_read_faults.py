@@ -240,11 +240,8 @@ REFUSED_ROTOR = [
 
 @pytest.mark.parametrize(
     ("scene", "case"),
-    [
-        (scene, case)
-        for scene, cases in (("press", (*REFUSED, *CONTRADICTING)), ("rotor", REFUSED_ROTOR))
-        for case in cases
-    ],
+    [*(("press", case) for case in (*REFUSED, *CONTRADICTING)), *(("rotor", case) for case in REFUSED_ROTOR)],
+    ids=lambda value: value if isinstance(value, str) else value[2],  # the key
 )
 def test_a_wrong_scene_is_refused_with_key_and_remedy(scene: str, case: tuple[str, str, str, str]) -> None:
     old, new, key, remedy = case
