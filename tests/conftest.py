@@ -14,11 +14,13 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 from hypothesis import HealthCheck, settings
+from typer.testing import CliRunner, Result
 from virtual import virtual_model
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
+from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -132,6 +134,24 @@ def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[
         return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
 
     return make
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A working directory of a module of tests, where its scenes are derived once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder := tmp_path_factory.mktemp("site"))
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def ballpass(site: Path) -> Callable[..., Result]:
+    """The command in this process, called in that directory."""
+
+    def call(*words: str | Path) -> Result:
+        return CliRunner().invoke(app, [*map(str, words)])
+
+    return call
 
 
 @pytest.fixture

@@ -6,39 +6,20 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load_solution
-from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A working directory, where the scene is derived once."""
-    before = Path.cwd()
-    folder = tmp_path_factory.mktemp("requests")
-    os.chdir(folder)
-    yield folder
-    os.chdir(before)
-
-
-@pytest.fixture(scope="module")
-def ballpass(site: Path) -> Callable[..., Result]:
-    def call(*words: str | Path) -> Result:
-        return CliRunner().invoke(app, [*map(str, words)])
-
-    return call
 
 
 def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(

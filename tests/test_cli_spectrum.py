@@ -4,36 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from ballpass.runtime import load
-from ballpass.runtime.app.cli import app
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "rotor.toml"
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    before = Path.cwd()
-    folder = tmp_path_factory.mktemp("spectrum")
-    os.chdir(folder)
-    yield folder
-    os.chdir(before)
-
-
-@pytest.fixture(scope="module")
-def ballpass(site: Path) -> Callable[..., Result]:
-    def call(*words: str | Path) -> Result:
-        return CliRunner().invoke(app, list(map(str, words)))
-
-    return call
 
 
 @pytest.fixture(scope="module")

@@ -5,19 +5,18 @@ from __future__ import annotations
 import csv
 import itertools
 import json
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 from matplotlib.image import imread
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from ballpass.derive import read_scene
 from ballpass.runtime import load
-from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.ranges import MOST, read_ranges
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.style import GREY
@@ -31,21 +30,8 @@ CLEARANCE, LOAD = "bearing.clearance", "load.force.x"
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A working directory, where the scene is derived once."""
-    before = Path.cwd()
-    folder = tmp_path_factory.mktemp("sweep")
-    os.chdir(folder)
-    yield folder
-    os.chdir(before)
-
-
-@pytest.fixture(scope="module")
-def sweep(site: Path) -> Callable[..., Result]:
-    def call(*words: str | Path) -> Result:
-        return CliRunner().invoke(app, ["sweep", *map(str, words)])
-
-    return call
+def sweep(ballpass: Callable[..., Result]) -> Callable[..., Result]:
+    return partial(ballpass, "sweep")
 
 
 @pytest.fixture(scope="module")
