@@ -81,11 +81,11 @@ def words(key: Key) -> str:
 def needed(uses: Sequence[tuple[Section, Key]], tables: Sequence[Section]) -> str:
     """Whether the key is needed, and for which values of the key that decides it."""
     variants = distinct(section.variant[1] for section in tables)
-    told: dict[str, list[str]] = {}
+    needed: dict[str, list[str]] = {}
     for section, key in uses:
-        told.setdefault(need(section, key), []).append(section.variant[1])
+        needed.setdefault(need(section, key), []).append(section.variant[1])
     texts = []
-    for text, values in told.items():
+    for text, values in needed.items():
         some = distinct(values)
         whole = not variants or len(some) == len(variants) or not some
         texts.append(text if whole else f"{', '.join(f'`{value}`' for value in some)}: {text}")

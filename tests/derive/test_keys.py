@@ -116,7 +116,7 @@ def test_every_number_of_a_shipped_scene_keeps_the_limits_of_its_key(file: Path)
 def test_placeholders_are_filled_once() -> None:
     """A body may be called like a placeholder."""
     assert (
-        QuantityKey(unit="kg", words="Mass of the NAME").told({"NAME": "INDEX", "INDEX": "x"}).words.endswith("INDEX")
+        QuantityKey(unit="kg", words="Mass of the NAME").filled({"NAME": "INDEX", "INDEX": "x"}).words.endswith("INDEX")
     )
 
 

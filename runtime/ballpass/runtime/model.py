@@ -123,7 +123,7 @@ class Model(PointModel, Questions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
-        self._assembled = b""  # parameters whose linkage was looked at last
+        self._assembled = b""  # parameters whose linkage was checked last
         self._run_settings: RunInfo | None = None
         if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
@@ -148,10 +148,10 @@ class Model(PointModel, Questions):
     def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
         """Numbers of a run whose linkage can be assembled; the last ones are not checked again."""
         numbers = self.numbers(parameters)
-        looked_at = numbers.p.tobytes()
-        if looked_at != self._assembled:
+        checked = numbers.p.tobytes()
+        if checked != self._assembled:
             check_assembly(self, numbers)
-            self._assembled = looked_at
+            self._assembled = checked
         return numbers
 
     def _start(self, numbers: Numbers, initial: Initial) -> Start:

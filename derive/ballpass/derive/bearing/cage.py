@@ -1,4 +1,4 @@
-"""Angle of the balls: pure rolling between two rings that turn, unless the scene says of the cage what it does.
+"""Angle of the balls: pure rolling between two rings that turn, or a cage that slips as the scene says.
 
 In: a bearing and how its rings turn.  Out: a `Cage`: angle and rate of ball 1, and what they are made of.
 """

@@ -1,4 +1,4 @@
-"""A cage whose slip changes: what it lags behind one that slips as in the last row.
+"""A cage whose slip changes over time: its lag behind a cage that has the slip of the last row.
 
 In: a bearing.  Out: the share of the rolling speed that the cage keeps in the end, and its `Lag` before, an angle that
 is linear between the rows.

@@ -237,7 +237,7 @@ def _ball(
         own=own,
         definitions=tuple(definitions),
         sums=sums,
-        # opposite balls are equal, and have equal forces, where no effect tells them apart
+        # opposite balls are equal, and have equal forces, where no effect distinguishes them
         switching=find_switching(parts, delta, delta_rate, pairs=bearing.balls % 2 == 0 and own is None),
     )
     return ball, gradient, parts

@@ -1,9 +1,9 @@
-"""Where the laws of a ball are not smooth: switching functions, and the law with its sides held.
+"""Where the laws of a ball are not smooth: switching functions, and the law continued from one side.
 
 In: the ball's elastic and damping force over deflection and rate.  Out: `Switching`: one function for each place at
 which a force, or its first or second derivative, jumps or is unbounded, and the force as a function of sides.
 
-Every case distinction of the laws is looked at.  It has two branches; what counts is with which power of the distance
+Every case distinction of the laws is examined.  It has two branches; what counts is with which power of the distance
 from the place where they meet their difference grows, along the quantity that decides (deflection or rate).  Smoothed
 laws also distinguish cases, but their branches meet smoothly, and those are no kinks.
 

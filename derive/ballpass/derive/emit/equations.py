@@ -88,11 +88,11 @@ def equations(system: System) -> str:
     if system.constants:
         parts += ["## Derived constants", "Evaluated once a run.", *_definitions(tex, system.constants)]
     if system.linkage is not None and system.reactions is not None:
-        told = {*system.reactions.definitions, *system.linear_forms}
+        listed = {*system.reactions.definitions, *system.linear_forms}
         parts += [
             "## Linkage",
             "Positions by driver and dyads, velocities and accelerations from the differentiated loop closure.",
-            *_definitions(tex, (d for d in system.definitions if d not in told)),
+            *_definitions(tex, (d for d in system.definitions if d not in listed)),
             "## Joint reactions and drive torque, Eq. (1)",
             "Newton and Euler for every moving body about its centre of mass.",
             *_linear_equations(

@@ -41,8 +41,8 @@ def json_schema() -> dict[str, Any]:
 
 def meaning(key: Key) -> str:
     """Schema of a key: its description and its bounds."""
-    told = key.told({"row ROW": "each row", ", AXIS": "", "AXIS": "each"}).words
-    words = f"{told[:1].upper()}{told[1:]}"
+    filled = key.filled({"row ROW": "each row", ", AXIS": "", "AXIS": "each"}).words
+    words = f"{filled[:1].upper()}{filled[1:]}"
     return words if not isinstance(key, QuantityKey) or key.bounds is None else f"{words}, {key.bounds}"
 
 

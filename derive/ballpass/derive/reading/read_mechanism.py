@@ -130,7 +130,7 @@ def _read_points(table: Table, body: str) -> tuple[NamedPoint, ...]:
     with table.table("points", 'A = "origin"') as listed:
         for name in listed.names("point", 'A = "origin"'):
             index = f"{upright(body)},{name if len(name) == 1 else upright(name)}"
-            key = POINT.told({"POINT": name, "OWNER": owner, "INDEX": index})
+            key = POINT.filled({"POINT": name, "OWNER": owner, "INDEX": index})
             points.append(NamedPoint(name=name, position=key.read(listed, name)))
     return tuple(points)
 

@@ -83,7 +83,7 @@ def _mechanism() -> Iterator[Section]:
     yield _of("mechanism.driver.flywheel", inertia=read_mechanism.FLYWHEEL)
     torques = {name: (keys_of(law), getattr(law, "either", None)) for name, law in TORQUE_LAWS.items()}
     yield from _variants("mechanism.driver.torque", read_mechanism.LAW, "law", torques)
-    points = {"*": records.POINT.told(NAME)}
+    points = {"*": records.POINT.filled(NAME)}
     yield Section(path=("mechanism", "frame", "points"), keys=points)
     yield _of("mechanism.bodies.*", records.Body)
     yield Section(path=("mechanism", "bodies", "*", "points"), keys=points)

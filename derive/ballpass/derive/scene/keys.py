@@ -59,7 +59,7 @@ class Key(ABC):
 
     quoted: ClassVar[bool] = True
 
-    def told(self, fill: Fill) -> Self:
+    def filled(self, fill: Fill) -> Self:
         """The key with its placeholders filled in."""
         values = {f.name: getattr(self, f.name) for f in fields(self)} if fill else {}
         texts: dict[str, Any] = {name: filled(v, fill) for name, v in values.items() if isinstance(v, str)}
@@ -205,7 +205,7 @@ class PairKey(QuantityKey):
         if not isinstance(given, list) or len(given) != 2:
             return self.refuse(table, name, "these are not two components", given)
         pairs = zip("xy", given, strict=True)
-        return tuple(self.told({"AXIS": axis}).at((*table.path, name, axis), table, item) for axis, item in pairs)
+        return tuple(self.filled({"AXIS": axis}).at((*table.path, name, axis), table, item) for axis, item in pairs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,7 +246,7 @@ class ColumnKey(QuantityKey):
             remedy = "write a list with one value for each row"
             return self.refuse(table, name, "this is not a column of numbers", given, allowed, remedy)
         return tuple(
-            self.told({"ROW": str(row)}).at(
+            self.filled({"ROW": str(row)}).at(
                 (*table.path, name, str(row)),
                 table,
                 f"{value!r} {suffix}" if suffix and isinstance(value, int | float) and abs(value) < 1e300 else value,

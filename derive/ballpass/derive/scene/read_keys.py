@@ -86,7 +86,7 @@ def column(unit: str, words: str, symbol: str, **more: Any) -> Any:
 
 def keys_of(kind: type[Any], fill: Fill = _NOTHING) -> dict[str, Key]:
     """Keys by their names in the file, in the order of a record's fields."""
-    found = (key.told(fill) for key in _keys(kind).values())
+    found = (key.filled(fill) for key in _keys(kind).values())
     return {key.name or name: key for name, key in zip(_keys(kind), found, strict=True)}
 
 
@@ -104,7 +104,7 @@ def read_keys(table: Table, keys: Mapping[str, Key], either: Either | None = Non
 
 def read_record(kind: type[Record], table: Table, fill: Fill = _NOTHING, **known: Any) -> Record:
     """A record from its keys; fields that are `known` are not read."""
-    keys = {name: key.told(fill) for name, key in _keys(kind).items() if name not in known}
+    keys = {name: key.filled(fill) for name, key in _keys(kind).items() if name not in known}
     names = {name: key.name or name for name, key in keys.items()}
     values = read_keys(table, {names[name]: key for name, key in keys.items()}, getattr(kind, "either", None))
     return kind(**{name: values[names[name]] for name in keys}, **known)

@@ -1,6 +1,6 @@
-"""The command line: ``ballpass run | derive | equations``.
+"""The list of all commands of ``ballpass``, and ``run``, ``derive``, ``equations`` and ``export``.
 
-The one module that knows both halves; it imports `ballpass.derive` where a command needs it.  Messages and progress go
+It imports `ballpass.derive` where a command needs it.  Messages and progress go
 to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130 interrupted.
 """
 
@@ -291,8 +291,7 @@ def run(
     if turned:
         show_parts(turned)
     if solution.accuracy is not None:
-        told = render_accuracy(model, solution.accuracy)
-        show_parts(told)
+        show_parts(render_accuracy(model, solution.accuracy))
         show_parts(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from ballpass.runtime.quantity.characteristic import turns_to_tell
+from ballpass.runtime.quantity.characteristic import turns_to_separate
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -39,7 +39,7 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         return None
     done = (solution.t[-1] - statistics.begin) / length
     numbers = {**solution.parameters, **solution.constants}
-    turns = turns_to_tell(solution.manifest, numbers)
+    turns = turns_to_separate(solution.manifest, numbers)
     if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
         return None
     rings = tuple(f"{b.prefix}{ring}." for b in solution.manifest.bearings for ring in ("inner", "outer"))

@@ -1,4 +1,4 @@
-"""Standard streams of a command as it needs them, whatever the shell has made of them.
+"""Standard streams made usable for a command: encodings, streams that are closed or full.
 
 Messages that nobody takes are lost, and the command works on; results that cannot be written are a fault.
 """

@@ -167,7 +167,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
     -------
     A sentence: which results change, over how many turns.
     """
-    told: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
+    added: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
     lines: list[tuple[bool, float, str]] = []
     for name, found in longer.reductions.items():
         entry, numbers = _printed(name, found)
@@ -177,7 +177,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
         if not numbers:
             continue
         unit, (peak, mean) = summary[entry]["unit"], longer.changes.get(name, (0.0, 0.0))
-        told[entry] = told.get(entry, {}) | _numbers(entry, unit, **numbers)
+        added[entry] = added.get(entry, {}) | _numbers(entry, unit, **numbers)
         factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
         for kind, value in numbers.items():
             before = summary[entry][kind]
@@ -192,21 +192,21 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
                 # rows of the table before those that it leaves out
                 lines.append((row_place(manifest, row) is None, -change, f"{words} {now} {shown} {than}"))
         if instead:
-            summary[entry] |= told[entry]
+            summary[entry] |= added[entry]
             for key in numbers.keys() & _BALL_FORCES.keys():
                 summary[entry]["time"][key], summary[entry]["ball"][key] = found.maximum_time, found.maximum_ball
                 summary[entry]["sampled"].pop(key)
     if longer.dropped:
-        told["transient_turns"] = _numbers("transient turns", "1", value=longer.dropped)
+        added["transient_turns"] = _numbers("transient turns", "1", value=longer.dropped)
     if longer.first:
-        told["of_start"] = {
+        added["of_start"] = {
             name: {"kind": kind, "time": time, "value": value, "later": later}
             for name, (kind, time, value, later) in longer.first.items()
         }
-    summary["longer"] = told
+    summary["longer"] = added
     if instead:
-        summary["steady_cycles"] = told["turns"]
-        words = longer.told(lambda name: inside(row_words(manifest, name)))
+        summary["steady_cycles"] = added["turns"]
+        words = longer.words_of(lambda name: inside(row_words(manifest, name)))
         return f"{words}. Samples and figures are those of the first turns."
     over = f"Over {longer.turns} steady turns"
     lines.sort(key=lambda line: line[:2])
@@ -302,7 +302,7 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
 
 def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
     """The highest force of any ball of each bearing, and how it was found."""
-    told = {}
+    forces = {}
     for bearing in manifest.bearings:
         names: dict[str, tuple[str, Kind]] = {key: (bearing.prefix + name, "max") for key, name in _BALL_FORCES.items()}
         peaks = {key: found_peaks[name] for key, name in names.items() if name in found_peaks}
@@ -312,8 +312,8 @@ def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> 
         for part, unit in (("time", "s"), ("ball", "1"), ("sampled", "N")):
             found[part] = {**{key: getattr(peak, part) for key, peak in peaks.items()}, "unit": unit}
         found["searched"] = {key: peak.searched for key, peak in peaks.items()}
-        told[f"{bearing.prefix}peak_ball_force"] = found
-    return told
+        forces[f"{bearing.prefix}peak_ball_force"] = found
+    return forces
 
 
 def _motions(sol: Solution) -> dict[str, Any]:

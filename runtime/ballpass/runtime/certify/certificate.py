@@ -1,11 +1,11 @@
-"""The second opinion on a derivative: another route to the same number, and what their comparison says.
+"""The certificate of a derivative: a second route to the same number, and the verdict of their comparison.
 
 In: two numbers with their uncertainties.  Out: a `Check` with a verdict.
 
 verified      both agree within the tolerance, and the second is known well enough to say so.  Where they agree only
               because a derivative below the quantum counts as nothing, the check says that too: `Check.bounded`
 disagrees     they differ by more than the tolerance and by more than their uncertainties explain
-not checked   the user turned the check off, or the uncertainties are too large for either answer (the reason is told):
+not checked   the user turned the check off, or the uncertainties are too large for either answer (the reason is given):
               in chaos, and where a contact grazes, no route gives a derivative that means anything
 """
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 #: Relative disagreement that is allowed [1].
 AGREEMENT = 1e-3
 
-#: Disagreement of the dimensionless derivative (p/Q) dQ/dp that is allowed besides: below it nothing is told apart [1].
+#: Disagreement of the dimensionless derivative (p/Q) dQ/dp allowed besides: smaller ones count as none [1].
 FLOOR = 1e-5
 
 #: Uncertainties, estimated from neighbouring approximations, may be too small by this factor.

@@ -1,6 +1,6 @@
 """Name the error instead of the method: run, run again tighter, until two whole runs agree within the target.
 
-In: a model, a request, a relative error, quantities.  Out: a `Solution` whose ``accuracy`` tells choice, estimate and
+In: a model, a request, a relative error, quantities.  Out: a `Solution` whose ``accuracy`` has choice, estimate and
 cost.
 
 `LADDER` holds the ways to integrate, from loose to tight; the target says where to begin.  A way and the next but one
@@ -201,7 +201,7 @@ def _compare(search: _Search, way: MethodChoice, check: MethodChoice) -> tuple[l
     estimates = _relative(loose, search(check), least * way.rtol)
     pairs = [((way, 0.0), (check, 0.0))]
     if way.kinks != LOCATED:
-        # what steps lose at kinks differs; what becomes of a picometre tells better, and best where kinks are located
+        # what steps lose at kinks differs; the growth of a picometre shows more, and best where kinks are located
         stepped = way if check.kinks == LOCATED else check
         pairs += [((one, 0.0), (one, MOVED)) for one in (stepped, FIRST_LOCATED)]
     for one, other in pairs:

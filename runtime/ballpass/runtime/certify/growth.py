@@ -1,4 +1,4 @@
-"""Growth of perturbations: does the tolerance of a run bear the digits of its numbers?
+"""Growth of perturbations: how many digits of a run's numbers its tolerance determines.
 
 In: a model, numbers, a request, or a table of members.  Out: a `Growth`, or the members whose numbers have no digits.
 
@@ -47,7 +47,7 @@ PARTED = 1e-3
 #: Times that a number may be off by what four of its digits bear, where steps lose that over kinks: more is said [1].
 LOST = 10.0
 
-#: Looser runs are looked at by this tolerance: what their steps lose is their error, not a growth [1].
+#: Looser runs are compared at this tolerance: what their steps lose is their error, not a growth [1].
 LOOSEST = 1e-6
 
 #: Tolerance of a second look at what a large change of the start leaves, over that of the first [1].
@@ -207,8 +207,8 @@ def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> tuple[Growth, di
 
     def integrate(start: float | np.ndarray, before: float) -> tuple[np.ndarray, np.ndarray, int]:
         tell = run.progress
-        told = replace(run, progress=None if tell is None else lambda done: tell(before + 0.5 * done))
-        found = way.measure(quantities, told, start)
+        moved = replace(run, progress=None if tell is None else lambda done: tell(before + 0.5 * done))
+        found = way.measure(quantities, moved, start)
         assert found.end is not None  # channels are of the motion
         return found.values.reshape(-1, len(KINDS)), found.end, found.steps
 

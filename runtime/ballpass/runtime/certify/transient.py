@@ -1,4 +1,4 @@
-"""The transient of a scene that states no run: turns until the motion has forgotten its start.
+"""The transient of a scene that states no run: turns until the start has no effect on the motion.
 
 In: a model, or a `Run`.  Out: run settings, or what a moved start still changes.
 

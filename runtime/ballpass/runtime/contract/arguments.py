@@ -1,6 +1,6 @@
 """Arguments of Python calls of a wrong type, refused where they enter by what their annotations say.
 
-Names, texts and paths are looked at here; numbers where their bounds are known.
+Names, texts and paths are checked here; numbers where their bounds are known.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _EXPECTED = {
     "LoadedModel": "a model that `load` gave",
     "Solution": "a solution of a run",
 }
-#: The annotations that are looked at.
+#: The annotations that are checked.
 _KINDS = frozenset(kind + none for kind in _EXPECTED for none in ("", " | None"))
 _EXAMPLES = {
     "outputs": '["inner.y"]',

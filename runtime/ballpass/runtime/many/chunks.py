@@ -241,14 +241,14 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
     others = results["status"] != End.TOO_MANY_STEPS
     failed = others & ((results["status"] != End.DONE) | (results["time"] < durations))
     for place in np.flatnonzero(failed).tolist():
-        member, told = int(which[place]), results[place]
-        if told["status"] in (STOPPED, End.DONE):
+        member, result = int(which[place]), results[place]
+        if result["status"] in (STOPPED, End.DONE):
             status, message = "INTERRUPTED", "Interrupted on its way."
         else:
-            ending = STATUS_OF_END[End(int(told["status"]))]
-            state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
-            status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
-        work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
+            ending = STATUS_OF_END[End(int(result["status"]))]
+            state = f", worst state {work.model.states[result['state']]}" if result["state"] >= 0 else ""
+            status, message = ending.name, f"{ending.value} Step size {result['step']:.3g} s{state}."
+        work.results[member] = MemberFailure(member=member, status=status, time=float(result["time"]), message=message)
     if rows is not None:
         void = is_void(work.model.manifest, {name: all_[which] for name, all_ in work.members.columns.items()}, rows)
         for place in np.flatnonzero(void & (results["status"] == End.DONE)).tolist():

@@ -169,7 +169,7 @@ def make_data_set(
     RequestError
         A wrong request; another data set, or something else, is there already; Zarr or Dask is not installed.
     SimulationError
-        A cluster gave up.  What was finished is kept: a second call goes on.
+        A cluster gave up.  What was finished is kept: a second call continues.
 
     Examples
     --------
@@ -375,7 +375,7 @@ def _fill(
         results = ((first, make_signals(here, signals, seed, members(first))) for first in firsts)
     else:
         results = run_tasks(
-            client, models, _make_chunk, tasks, "What was finished before is kept: a second call goes on."
+            client, models, _make_chunk, tasks, "What was finished before is kept: a second call continues."
         )
     for first, chunk in results:
         write_samples(group, first, chunk)

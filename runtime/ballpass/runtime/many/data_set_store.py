@@ -33,7 +33,7 @@ MESSAGE = 300
 STATUSES = ("unfinished", "made", "failed")
 UNFINISHED, MADE, FAILED = range(3)
 
-#: File by which a worker sees whether a folder is the one that it was told of, on this machine or a shared disk.
+#: File by which a worker sees whether a folder is the one that it was given, on this machine or a shared disk.
 MARK = ".ballpass-mark"
 
 
@@ -113,7 +113,7 @@ def open_store(path: str | Path) -> Any:
 
 
 def is_complete(store: Path) -> bool:
-    """Whether a store was made with all its axes; the file looked at is written last."""
+    """Whether a store was made with all its axes; the file it looks for is written last."""
     return (store / ".zmetadata").exists()
 
 

@@ -25,7 +25,8 @@ PARTS, MOST = 4, 4096
 
 #: What becomes of finished members where Dask gives up.
 LOST = (
-    "The members simulated before are lost: call simulate_many again, or make a data set, which goes on where it ended."
+    "The members simulated before are lost: call simulate_many again, or make a data set, which continues where it "
+    "ended."
 )
 
 

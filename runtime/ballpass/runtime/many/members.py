@@ -123,8 +123,8 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
         columns[name] = column
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        faults.append(f"The columns must be of one length, a value for each member: {told}")
+        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        faults.append(f"The columns must be of one length, a value for each member: {listed}")
     if not faults and not next(iter(lengths.values())):
         faults.append("There are no members: the columns are empty. Give at least one value.")
     if faults:

@@ -35,7 +35,7 @@ TIMEOUT = 300.0
 #: Longest a compiler may take to tell its version [s].
 ANSWER_TIMEOUT = 30.0
 
-#: Time a compiler has to end, and to delete its temporary files, once it is told to [s].
+#: Time a compiler has to end, and to delete its temporary files, once it is asked to [s].
 GRACE = 2.0
 
 
@@ -81,7 +81,7 @@ def find_compiler(command: str | None = None) -> Compiler | None:
         if path is not None:
             return _describe((path,))
     if importlib.util.find_spec("ziglang") is not None:
-        # zig compiles for the processor at hand without being told
+        # zig compiles for the processor at hand by itself
         return Compiler(
             command=(sys.executable, "-m", "ziglang", "cc"),
             flags=FLAGS,

@@ -126,7 +126,7 @@ def open_driver(
 
     Parameters
     ----------
-    sizes : name of the C function that tells the library's sizes: some numbers, then bytes of the records
+    sizes : name of the C function that returns the library's sizes: some numbers, then bytes of the records
     numbers : how many numbers
     records : as declared here
 

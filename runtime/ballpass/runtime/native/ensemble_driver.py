@@ -119,9 +119,9 @@ class EnsembleDriver:
         declare(code, "ballpass_ensemble_work", long, long)
         declare(code, "ballpass_ensemble_magnitudes", None, long, *states, LONGS, DOUBLES, DOUBLES, DOUBLES)
         segments = (LONGS, DOUBLES, DOUBLES, BYTES)
-        told = (DOUBLES, DOUBLES, ArrayOf(RESULT))
+        results = (DOUBLES, DOUBLES, ArrayOf(RESULT))
         options = ctypes.POINTER(_EnsembleOptions)
-        declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *told)
+        declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *results)
 
     def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
         """The same with another driver of single runs, which must have reductions."""
@@ -157,7 +157,7 @@ class EnsembleDriver:
         reductions : rows to add to, or None
         stop : the call ends soon after this becomes nonzero
         max_steps : allowed to all members, or to each, shape (members,); accepted and rejected, in all calls
-        carried : from `carry`; a second call with it goes on where the first ended, with the same `x` and `reductions`
+        carried : from `carry`; with it a second call continues, with the same `x` and `reductions`
         reached : how far each member has come, written while the call is under way, shape (members,) [s]
 
         Returns

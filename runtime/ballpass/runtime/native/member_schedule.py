@@ -41,7 +41,7 @@ class _Schedule(ctypes.Structure):
     )
 
 
-#: Records as the library declares them, in the order in which it tells their sizes.
+#: Records as the library declares them, in the order in which it returns their sizes.
 SCHEDULE_RECORDS = (_Schedule, _ScheduleInput)
 
 

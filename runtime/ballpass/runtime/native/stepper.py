@@ -85,7 +85,7 @@ class _Result(ctypes.Structure):
     )
 
 
-#: The same for arrays: what is told of every member of an ensemble.
+#: The same for arrays: what is reported of every member of an ensemble.
 RESULT = np.dtype(_Result)
 
 
@@ -107,7 +107,7 @@ class Segments:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a run of the driver tells.
+    """What a run of the driver reports.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Outcome:
 
 
 #: Fields of an outcome that are those of C.
-_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "method", "ends"))
+_REPORTED = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "method", "ends"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -260,8 +260,8 @@ class Stepper:
         reduction : row of on-line reductions to add to; the library must have been compiled with reductions
         before : row that segments before the first one of `reduction` are added to
         max_steps : accepted and rejected
-        held : from `hold`; where a call with it has taken all its steps, another goes on with the same arguments and
-            more `max_steps`, which then count those of all calls, as the counts told do.  The bits are those of one
+        held : from `hold`; where a call with it has taken all its steps, another continues with the same arguments and
+            more `max_steps`, which then count those of all calls, as the reported counts do.  The bits are those of one
             call.  Not with `tangents`
         ends : filled with the end of each accepted step [s] and 1.0 where it lies on a kink, else 0.0, shape (steps, 2)
             with room for those of this call; `Outcome.ends` says how many they are
@@ -304,8 +304,8 @@ class Stepper:
                 **{name: address(getattr(tangents, name)) for name in names},
             )
             self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
-        told = {name: getattr(result, name) for name in _TOLD}
-        return Outcome(end=End(result.status), method=NAMES[result.method], ends=ended.value, **told)
+        reported = {name: getattr(result, name) for name in _REPORTED}
+        return Outcome(end=End(result.status), method=NAMES[result.method], ends=ended.value, **reported)
 
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float

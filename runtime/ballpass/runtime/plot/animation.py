@@ -1,4 +1,4 @@
-"""What a moving picture of a run shows: linkage, bearings and signals at samples of its last turns.
+"""Content of a moving picture of a run: linkage, bearings and signals at samples of its last turns.
 
 In: records of the bearings of one run.  Out: `Frames`, and the same as plain numbers for the page of `html_page`.
 """

@@ -1,4 +1,4 @@
-"""The way of a search to the least value: values of the goal at each evaluation.
+"""A search for the least value: the goal at each evaluation.
 
 In: values.  Out: a figure.
 """

@@ -49,10 +49,10 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
     pairs = _bars(report, quantity)
     if not pairs:
         raise RequestError(f"tornado: no parameter of this report moves {quantity}: there is nothing to draw.")
-    told = [report.words[pair.parameter] for pair in pairs]
+    labels = [report.words[pair.parameter] for pair in pairs]
     bars_of = [
-        words if told.count(words) == 1 else f"{words} ({pair.parameter})"
-        for words, pair in zip(told, pairs, strict=True)
+        words if labels.count(words) == 1 else f"{words} ({pair.parameter})"
+        for words, pair in zip(labels, pairs, strict=True)
     ]
     figure = new_figure(1.8 + 0.36 * len(pairs))
     axes = figure.add_subplot()

@@ -1,4 +1,4 @@
-"""The figure of a trade: error against time, both logarithmic, and the front that no other way beats."""
+"""The figure of a trade: error against time, both logarithmic, and the front that no other choice beats."""
 
 from __future__ import annotations
 

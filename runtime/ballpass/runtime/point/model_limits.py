@@ -1,4 +1,4 @@
-"""Where a model's simplifications decide about its forces: sentences for people, with the command that measures it.
+"""Where a model's simplifications decide about its forces: sentences, with the command that measures it.
 
 In: a manifest and values of its parameters and constants.  Out: sentences; none where nothing is to be said.
 """

@@ -177,8 +177,8 @@ def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     return next((name.words for name in names_of(frequency, lines, resolution)), "")
 
 
-def turns_to_tell(manifest: Manifest, values: Mapping[str, float]) -> int:
-    """Turns of a spectrum that tells ball pass from the nearest multiple of the shaft; `TURNS` at least.
+def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
+    """Turns of a spectrum that separates ball pass from the nearest multiple of the shaft; `TURNS` at least.
 
     Parameters
     ----------

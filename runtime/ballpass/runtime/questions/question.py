@@ -93,7 +93,7 @@ def _with_options(ask: Callable[..., Any]) -> str:
     lines = []
     for name, (_, option) in options_of(ask).items():
         default = defaults[name].default
-        told = "" if default in (None, Parameter.empty) else f"  Default: {default!r}"
+        by_default = "" if default in (None, Parameter.empty) else f"  Default: {default!r}"
         unit = f" [{option.unit}]" if option.unit else ""
-        lines.append(f"{name} : {option.words}{told}{unit}")
+        lines.append(f"{name} : {option.words}{by_default}{unit}")
     return "\n".join([words, "", "Parameters", "----------", *lines]) + others

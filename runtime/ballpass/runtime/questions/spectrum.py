@@ -417,7 +417,7 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
     """Turns of a run that tells ball pass from the shaft; None where a table gives the speed or nothing turns."""
-    from ballpass.runtime.quantity.characteristic import turns_to_tell
+    from ballpass.runtime.quantity.characteristic import turns_to_separate
     from ballpass.runtime.run.driver_angle import period
 
     manifest, values = model.manifest, model.numbers(parameters).values
@@ -427,7 +427,7 @@ def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: f
     settings = model.run_settings
     stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
     dropped = settings.transient_cycles if transient is None else transient
-    return max(stated, dropped + turns_to_tell(manifest, values))
+    return max(stated, dropped + turns_to_separate(manifest, values))
 
 
 def _angle(solution: Solution) -> np.ndarray:

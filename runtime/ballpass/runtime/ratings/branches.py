@@ -1,4 +1,4 @@
-"""Choices made of arithmetic alone, so that floats, arrays and CasADi's symbols go through them."""
+"""Case distinctions by arithmetic alone, so that floats, arrays and CasADi's symbols go through them."""
 
 from __future__ import annotations
 

@@ -34,8 +34,8 @@ class Tilt:
             known = "Misalignment and bending of the shaft are in no number here"
             return f"{known}{f'; {free}' if free else ''}."
         parts = {"misalignment": self.misalignment, "bending of the shaft": self.bending}
-        told = ", ".join(f"{name} {value / ARCMIN:.3g} arcmin" for name, value in parts.items() if value is not None)
-        return f"Tilt by {told}{f'; {free}' if free else ''}."
+        causes = ", ".join(f"{name} {value / ARCMIN:.3g} arcmin" for name, value in parts.items() if value is not None)
+        return f"Tilt by {causes}{f'; {free}' if free else ''}."
 
     @property
     def beyond(self) -> str:

@@ -74,9 +74,9 @@ class Settled(ShortRepr):
     @property
     def words(self) -> str:
         """The result as a sentence."""
-        return self.told(str)
+        return self.words_of(str)
 
-    def told(self, called: Callable[[str], str]) -> str:
+    def words_of(self, called: Callable[[str], str]) -> str:
         """The result as a sentence, with words for the name of a channel."""
         name = max(self.changes, key=lambda channel: max(self.changes[channel]))
         peak, mean = self.changes[name]

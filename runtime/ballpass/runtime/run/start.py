@@ -37,7 +37,7 @@ class RunEnd(ShortRepr):
     Examples
     --------
     >>> first = model.simulate(cycles=1)
-    >>> rest = model.simulate(cycles=2, initial=first.end)  # goes on
+    >>> rest = model.simulate(cycles=2, initial=first.end)  # continues
     >>> f"{rest.t[0] / model.period():.1f} turns"
     '1.0 turns'
     """

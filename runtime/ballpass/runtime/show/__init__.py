@@ -1,1 +1,1 @@
-"""How objects show themselves: short texts, tables of notebooks, progress of long calls."""
+"""Short texts of objects, tables of notebooks, progress of long calls."""

@@ -43,14 +43,14 @@ class BallDeviation(Effect):
 
     name = "ball_deviation"
     words = "balls of different diameters"
-    tables = MappingProxyType({(): {"#": DEVIATION.told({"BALL": "<ball>"})}})
+    tables = MappingProxyType({(): {"#": DEVIATION.filled({"BALL": "<ball>"})}})
 
     def read(self, table: Table, balls: int) -> BallEffect:
         with table:
             names = [str(number) for number in range(1, balls + 1)]
             table.know(*names)
             deviations = [
-                Deviation(ball=int(name), size=DEVIATION.told({"BALL": name}).read(table, name))
+                Deviation(ball=int(name), size=DEVIATION.filled({"BALL": name}).read(table, name))
                 for name in names
                 if name in table.data
             ]

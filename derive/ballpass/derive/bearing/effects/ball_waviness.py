@@ -64,11 +64,11 @@ class BallWaviness(Effect):
         orders: dict[str, list[str]] = {}
         for wave in effect.parts:
             orders.setdefault(wave.whose, []).append(str(wave.order))
-        told = (
+        parts = (
             f"{'each ball' if whose == EACH else f'ball {whose}'}: orders {', '.join(of)}"
             for whose, of in orders.items()
         )
-        return "waves around the balls, of which only even orders act; " + "; ".join(told)
+        return "waves around the balls, of which only even orders act; " + "; ".join(parts)
 
 
 def _for_every_ball(table: Table, balls: int) -> dict[str, object]:

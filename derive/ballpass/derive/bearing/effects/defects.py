@@ -151,11 +151,11 @@ class Defects(Effect):
         return taken
 
     def describe(self, effect: BallEffect) -> str:
-        told = []
+        parts = []
         for spall in effect.parts:
             where = f"ball {spall.ball}" if spall.on == "ball" else f"the {spall.on} raceway"
-            told.append(f"{spall.name} on {where}, {spall.shape}")
-        return "local defects: " + "; ".join(told)
+            parts.append(f"{spall.name} on {where}, {spall.shape}")
+        return "local defects: " + "; ".join(parts)
 
 
 def _read_spall(data: Table, name: str, balls: int) -> Spall:

@@ -46,7 +46,7 @@ class Ball(RollingElement):
             if groove is None:
                 try:
                     groove = f"{parse_quantity(ball_diameter, 'm') * float(ratio)!r} m"
-                except QuantityError:  # told where the ball diameter is read
+                except QuantityError:  # reported where the ball diameter is read
                     groove = "1 m"
             filled[f"{ring}_groove_radius"] = groove
         return filled

@@ -50,7 +50,7 @@ class DampingLaw(ABC):
         ----------
         fill : texts that the rolling element puts for others, see `RollingElement.fill`
         """
-        keys = {name: key.told({"LAW": self.name, **fill}) for name, key in self.keys.items()}
+        keys = {name: key.filled({"LAW": self.name, **fill}) for name, key in self.keys.items()}
         return tuple(number for number in read_keys(table, keys, self.either).values() if number is not None)
 
     @abstractmethod

@@ -250,8 +250,8 @@ def _progress(stages: Stages) -> Callable[..., None]:
     """Called with the finished fraction, after words by calls with several stages."""
     begun: list[str] = []
 
-    def tell(*told: Any) -> None:
-        *words, fraction = told
+    def tell(*report: Any) -> None:
+        *words, fraction = report
         for stage in words:
             if stage not in begun:
                 begun.append(stage)

@@ -175,9 +175,9 @@ def sweep(
         table = swept.all_members() if count <= ROWS else swept.extremes()
         show_parts(table)
         pictures = [name for name in files if name.startswith("sweep_")]
-        drawn, told = len(pictures), [name for name in files if name not in pictures]
-        told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
-        show(f"{count} members, {len(result.failures)} without results. In {folder}: {', '.join(told)}")
+        drawn, named = len(pictures), [name for name in files if name not in pictures]
+        named += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
+        show(f"{count} members, {len(result.failures)} without results. In {folder}: {', '.join(named)}")
     for failure in result.failures[:NAMED]:
         warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
     if len(result.failures) > NAMED:
