@@ -111,17 +111,20 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     force = ball.elastic_force
     elastic = next(d.expression for d in ball.definitions if d.symbol == force)
     slope, count = sp.diff(elastic, ball.deflection), _count(bearing)
-    directions = {"xx": ball.cos**2, "xy": ball.cos * ball.sin, "yy": ball.sin**2}
+    deflection = next(d.expression for d in ball.definitions if d.symbol == ball.deflection)
+    x, y = (c.position for c in model.coordinates[:2])
+    axes_of = {"xx": (x, x), "xy": (x, y), "yy": (y, y)}
     out = [
         Output(
             name=f"{names.prefix}contact.stiffness.{axes}",
-            expression=count * slope * along * ball.cosine**2,
+            expression=count
+            * (slope * sp.diff(deflection, one) * sp.diff(deflection, other) + force * sp.diff(deflection, one, other)),
             unit="N/m",
             description=f"Entry {axes} of the stiffness matrix of all balls{of}",
             balls_of=names.prefix,
             over_balls=True,
         )
-        for axes, along in directions.items()
+        for axes, (one, other) in axes_of.items()
     ]
     out += [
         Output(

@@ -28,6 +28,10 @@ class ContactDirection:
     gap: sp.Expr
     constants: tuple[Definition, ...] = ()
 
+    def deflection(self, approach: sp.Expr) -> sp.Expr:
+        """Deflection of a ball [m] from the approach of the rings along it [m]."""
+        return self.cosine * (approach - self.gap)
+
 
 def contact_cosine(bearing: Bearing) -> sp.Expr:
     """Cosine of the contact angle: a constant that `contact_direction` defines, or 1."""

@@ -39,12 +39,13 @@ class BallRelations:
     cage_share, ring_rate : see `cage.Cage`
     in_outer, in_inner : angle of ball 1 as the rings see it, see `cage.Cage` [rad]
     cos, sin : of the angle of ball j
-    cosine : of the contact angle; 1 where the scene names none
+    cosine : factor of all sums of forces: of the contact angle; 1 where the scene names none
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
     definitions : they use `cos` and `sin`
-    sums : symbol := sum of the expression over j, the forces along x and y; where bodies move with the rings, the
-        torque on the inner one by what effects take from the deflections as well
+    sums : symbol := sum over j of the force times a weight; `weights` says which
+    weights : slopes of the deflection along x and y, without `cosine`; where bodies move with the rings, also that of
+        what effects take from it, by the angle of the inner ring: its sum is a torque
     switching : where the force of a ball has kinks
     """
 
@@ -66,11 +67,12 @@ class BallRelations:
     own: OwnTerms | None
     definitions: tuple[Definition, ...]
     sums: tuple[Definition, ...]
+    weights: tuple[sp.Expr, ...]
     switching: Switching
 
     @property
     def ring_force(self) -> Pair:
-        """Force of the inner ring on the balls, x and y: the radial part of the balls' forces [N]."""
+        """Force of the inner ring on the balls, x and y, by virtual work: the radial part of their forces [N]."""
         sum_x, sum_y = (s.symbol for s in self.sums[:2])
         return self.cosine * sum_x, self.cosine * sum_y
 
@@ -84,7 +86,6 @@ class BearingModel:
     constants: tuple[Definition, ...]
     coordinates: tuple[Coordinate, ...]
     ball: BallRelations
-    gradient: tuple[sp.Expr, ...]  # of a ball's deflection along the coordinates
     laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
 
 
@@ -110,14 +111,13 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     if coefficient != 0:
         constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
     coordinates = ring_coordinates(bearing)
-    ball, gradient, parts = _ball(bearing, names, coordinates, cage)
+    ball, parts = _ball(bearing, names, coordinates, cage)
     return BearingModel(
         names=names,
         noun=ELEMENTS[bearing.element].noun,
         constants=tuple(constants),
         coordinates=coordinates,
         ball=ball,
-        gradient=tuple(gradient),
         laws=tuple(
             (name, smoothness_of(part, ball.deflection, ball.deflection_rate))
             for name, part in zip(("elastic", "damping"), parts, strict=False)
@@ -149,8 +149,8 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
 
 def _ball(
     bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage: Cage
-) -> tuple[BallRelations, list[sp.Expr], list[sp.Expr]]:
-    """The generic ball, d(delta_j)/d(coordinate) for each coordinate, and the parts of its force."""
+) -> tuple[BallRelations, list[sp.Expr]]:
+    """The generic ball, and the parts of its force."""
     cos, sin, speed = names.variable("ball.cos"), names.variable("ball.sin"), cage.rate
     motion = {c.position: sp.Function(c.name)(TIME) for c in coordinates}
     angle = sp.Function("theta")(TIME)
@@ -160,7 +160,10 @@ def _ball(
         for axis in (0, 1)
     )
     contact_at = contact_direction(bearing)
-    geometry = contact_at.cosine * (x * sp.cos(angle) + y * sp.sin(angle) - contact_at.gap)
+    geometry = contact_at.deflection(x * sp.cos(angle) + y * sp.sin(angle))
+    approach = sp.Dummy("approach", real=True)
+    steepness = sp.diff(contact_at.deflection(approach), approach)
+    alike = approach not in steepness.free_symbols  # for all balls
     # Eq. (11): the time derivative, the cage turning
     rate = sp.diff(geometry.subs(motion), TIME)
     rate = rate.subs(sp.diff(angle, TIME), speed)
@@ -168,7 +171,8 @@ def _ball(
     rate = rate.subs({moving: fixed for fixed, moving in motion.items()})
     direction = {sp.cos(angle): cos, sp.sin(angle): sin}
     geometry, rate = geometry.subs(direction), rate.subs(direction)
-    gradient = [sp.diff(geometry, c.position) for c in coordinates]
+    cosine = steepness if alike else sp.S.One
+    weights = [sp.diff(geometry, c.position) / cosine for c in coordinates[:2]]
     own = _own_terms(bearing, names, cage, cos, sin)
     if own is not None:
         geometry, rate = geometry - own.deflection, rate - own.rate
@@ -206,17 +210,18 @@ def _ball(
     sums = tuple(
         names.define(
             names.variable(f"ball.sum_{axis}"),
-            force * along,
+            force * weight,
             "N",
             f"Sum of the ball forces along {axis}, Eqs. (8) and (9)",
             rf"(F_{axis} + F_{{c,{axis}}})",
         )
-        for axis, along in (("x", cos), ("y", sin))
+        for axis, weight in zip("xy", weights, strict=True)
     )
     sloped = own is not None and any(d.symbol == own.slope and d.expression != 0 for d in own.definitions)
     if own is not None and sloped and bearing.coupling == "two-way":
         words = "Torque of the ball forces on the inner ring by the slopes of the reductions of their deflections"
         torque = names.variable("ball.sum_torque")
+        weights.append(own.slope)
         sums += (names.define(torque, force * own.slope, "N*m", words, r"\textstyle\sum_j F_j e'_j"),)
     ball = BallRelations(
         count=bearing.balls,
@@ -228,7 +233,7 @@ def _ball(
         in_inner=cage.in_inner,
         cos=cos,
         sin=sin,
-        cosine=contact_at.cosine,
+        cosine=cosine,
         deflection=delta,
         deflection_rate=delta_rate,
         elastic_force=elastic,
@@ -237,10 +242,11 @@ def _ball(
         own=own,
         definitions=tuple(definitions),
         sums=sums,
-        # opposite balls are equal, and have equal forces, where no effect distinguishes them
-        switching=find_switching(parts, delta, delta_rate, pairs=bearing.balls % 2 == 0 and own is None),
+        weights=tuple(weights),
+        # opposite balls are equal, and have opposite rates, where no effect and no curved path distinguishes them
+        switching=find_switching(parts, delta, delta_rate, pairs=bearing.balls % 2 == 0 and own is None and alike),
     )
-    return ball, gradient, parts
+    return ball, parts
 
 
 def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: sp.Symbol) -> OwnTerms | None:
@@ -311,11 +317,10 @@ def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: s
         potential += half * symbol_of(outer.stiffness) * (q[2] ** 2 + q[3] ** 2)
         dissipation += half * symbol_of(outer.damping) * (v[2] ** 2 + v[3] ** 2)
     mass = sp.ImmutableMatrix(sp.hessian(kinetic, v))
-    sum_x, sum_y = (s.symbol for s in ball.sums[:2])
     forcing = []
-    for k, slope in enumerate(model.gradient):
-        # virtual work of the balls: -sum_j F_j d(delta_j)/d(q_k), linear in cos and sin of theta_j
-        contact = -(slope.coeff(ball.cos) * sum_x + slope.coeff(ball.sin) * sum_y)
+    for k in range(len(coordinates)):
+        # virtual work of the balls: -sum_j F_j d(delta_j)/d(q_k), which the outer ring has with the other sign
+        contact = (-1 if k < 2 else 1) * ball.ring_force[k % 2]
         applied = load[k] if k < 2 else sp.S.Zero
         forcing.append(applied + contact - sp.diff(potential, q[k]) - sp.diff(dissipation, v[k]))
     words = "Mass moved by the inner ring, Eq. (3) or given"

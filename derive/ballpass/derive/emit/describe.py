@@ -74,7 +74,6 @@ def describe(
         mechanism=_mechanism(system),
         bearings=_bearings(system),
         run=info_of(mf.RunInfo, scene.run),
-        unfit=functions.unfit,
         duty=duty_info(scene),
         files=files,
     )

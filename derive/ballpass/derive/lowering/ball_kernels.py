@@ -5,7 +5,8 @@ In: the generic ball, and visitors of a lowering.  Out: `BallKernels`, small SX 
     co, si   direction of the ball
     r        delta = r0 + r1 co + r2 si - e,  d(delta)/dt = r3 co + r4 si - de/dt,  e: what effects take (own_terms);
              r5, r6: cosine and sine of the cage's angle; where rings do not turn evenly, behind these what e needs of
-             the state, as the speed of the rings and the cosine and sine of the inner one's angle
+             the state, as the speed of the rings and the cosine and sine of the inner one's angle.  Where deflection
+             or rate is no such sum, r0 to r4 are zero, and all that these need of the state is behind r6
     k        numbers of the ball: entries of p, c and w, gathered once by ``numbers``
 
 Each gives *rows*, summands over the balls; the C driver loops over balls (lanes), adds the rows up, and knows counts
@@ -14,7 +15,8 @@ only:
 numbers   (p, c, w) -> k
 forces    -> S            F co, F si; F e' where effects turn bodies (own_terms)
 slopes    -> S, G         and the slopes of S: Fd cc, Fd cs, Fd ss, Fv cc, Fv cs, Fv ss; with effects the rows that
-                          time alone moves, or, where rings do not turn evenly, all derivatives one by one
+                          time alone moves; or, where rings do not turn evenly or deflections are no such sum, all
+                          derivatives one by one
 partials  -> S, G, ...    and the derivatives of S by the ball's angle, by r0 and by k
 moved     (..., along directions of co, si, r, k) -> derivative of G
 sums_moved  (sums of the rows of partials, along directions of r, angle, k) -> derivative of S
@@ -35,15 +37,8 @@ from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS, relative_motion, ring_motion_slopes
 from ballpass.derive.lowering.visitor import Visitor
 
-#: Rows of the sums that every bearing has.
-FORCES = 2
-
 #: Rows of `contact`.
 CONTACT = ("force", "elastic_force", "damping_force", "deflection")
-
-
-class UnfitError(Exception):
-    """The stepper's kernels do not take a model; it runs on CasADi's functions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,31 +100,36 @@ class BallBuilder:
         self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
         self._further: dict[sp.Expr, ca.SX] = {}
         own = bearing.ball.own
-        self.uneven = own is not None and own.slope is not None
         # what all balls have alike may be named among the definitions of one
         self._named = of_state.child({}, self._definitions)
+        affine = self._affine()
+        #: whether slopes are taken one by one
+        self.general = affine is None or (own is not None and own.slope is not None)
         leaves = {symbol: ca.SX.sym(symbol.name) for symbol in states}
-        self._of_ball = of_all(self._hoist, leaves) if self.uneven else of_state
-        rings = self._relative()
+        self._of_ball = of_all(self._hoist, leaves) if self.general else of_state
+        cage = [sp.cos(bearing.ball.cage_angle), sp.sin(bearing.ball.cage_angle)]
+        rings = ca.vertcat(*map(of_state, affine or [sp.S.Zero] * RINGS), *map(of_state, cage))
         co, si, r = self.co, self.si, self.r
-        self._rows = self._ball(*relative_motion(r, co, si), co, si)
+        self._rows = self._ball(None if affine is None else relative_motion(r, co, si), co, si)
         # opposite balls share their direction, and the products with it
-        opposite = bearing.ball.count % 2 == 0 and not self.uneven
-        self._opposite = self._ball(*relative_motion(r, -co, -si), -co, -si) if opposite else None
-        motion = self._own_motion(self._rows)
-        self._further |= {s: leaf for s, leaf in leaves.items() if self.uneven and ca.depends_on(motion, leaf)}
-        expressions = [self._named(e) for e in self._further]
-        self.relative = ca.vertcat(rings, *expressions)
-        #: what moves the motion of a ball, not only decides between cases
-        self._live = [
-            _is_smooth_in(motion, entry) and any(_is_smooth_in(e, s) for s in ca.symvar(e))
-            for entry, e in zip(self._further.values(), expressions, strict=True)
+        opposite = bearing.ball.count % 2 == 0 and not self.general
+        self._opposite = self._ball(relative_motion(r, -co, -si), -co, -si) if opposite else None
+        motion = self._motion(self._rows)
+        self._further |= {s: leaf for s, leaf in leaves.items() if self.general and ca.depends_on(motion, leaf)}
+        self.relative = ca.vertcat(rings, *(self._named(e) for e in self._further))
+        entries = [None, *ca.vertsplit(r[1:]), *[None] * (RELATIVE - RINGS), *self._further.values()]
+        #: entries of r that move a ball, not only decide between cases; None for others, and for the cage's direction
+        self._moving = [
+            entry
+            if entry is not None and _is_smooth_in(motion, entry) and any(_is_smooth_in(e, s) for s in ca.symvar(e))
+            else None
+            for entry, e in zip(entries, ca.vertsplit(self.relative), strict=True)
         ]
 
     @staticmethod
-    def _own_motion(at: dict[str, ca.SX]) -> ca.SX:
-        """Deflection, its rate, and the slope of what effects take."""
-        return ca.vertcat(at["delta"], at["rate"], at["own_third"])
+    def _motion(at: dict[str, ca.SX]) -> ca.SX:
+        """Deflection, its rate, and the weights of the force."""
+        return ca.vertcat(at["delta"], at["rate"], at["weights"])
 
     def _hoist(self, expression: sp.Expr) -> ca.SX:
         """Entry of r behind the cage's direction, for what depends on time or state but not on the ball."""
@@ -139,13 +139,9 @@ class BallBuilder:
             self._further[expression] = ca.SX.sym(f"z{len(self._further)}")
         return self._further[expression]
 
-    def _relative(self) -> ca.SX:
-        """Coefficients of deflection and rate, without what effects take, and the direction of the cage.
-
-        Raises
-        ------
-        UnfitError
-            Deflection or rate is not linear in the direction of the ball.
+    def _affine(self) -> list[sp.Expr] | None:
+        """Coefficients of deflection and rate, without what effects take; None where these are not linear in the
+        direction of the ball, or the part that no direction changes is no constant of a run.
         """
         ball = self.bearing.ball
         own = {ball.own.deflection: 0, ball.own.rate: 0} if ball.own is not None else {}
@@ -154,23 +150,28 @@ class BallBuilder:
             expression = sp.expand(sp.sympify(self._definitions.get(which, sp.S.Zero)).subs(own))
             along, across = expression.coeff(ball.cos), expression.coeff(ball.sin)
             rest = sp.expand(expression - along * ball.cos - across * ball.sin)
-            if rest.has(ball.cos, ball.sin) or (not constant and rest != 0):
-                raise UnfitError(f"{which} is not linear in the direction of the ball")
+            if rest.has(ball.cos, ball.sin) or (self._moves(rest) if constant else rest != 0):
+                return None
             rows += [rest, along, across] if constant else [along, across]
-        rows += [sp.cos(ball.cage_angle), sp.sin(ball.cage_angle)]
-        return ca.vertcat(*(self._of_state(row) for row in rows))
+        return rows
 
-    def _ball(self, delta: ca.SX, rate: ca.SX, co: ca.SX, si: ca.SX) -> dict[str, ca.SX]:
-        """Force, slopes and all that rows are made of, for a geometric deflection and rate at a direction."""
+    def _ball(self, rings: tuple[ca.SX, ca.SX] | None, co: ca.SX, si: ca.SX) -> dict[str, ca.SX]:
+        """Force, slopes and all that rows are made of, at a direction.
+
+        Parameters
+        ----------
+        rings : deflection and its rate without what effects take; None takes them from their definitions
+        """
         ball, nothing = self.bearing.ball, ca.SX(0.0)
+        at = self._of_ball.child({ball.cos: co, ball.sin: si}, self._definitions)
+        inner = (ball.deflection, ball.deflection_rate)
+        delta, rate = rings or (at(self._definitions.get(s, sp.S.Zero)) for s in inner)
         taken = [nothing] * 3
-        if ball.own is not None:
-            at = self._of_ball.child({ball.cos: co, ball.sin: si}, self._definitions)
+        if rings is not None and ball.own is not None:
             # their expressions: where all balls are alike these are hoisted whole
-            third = ball.own.slope if self.uneven else ball.own.acceleration
+            third = ball.own.slope if ball.own.acceleration is None else ball.own.acceleration
             taken = [at(self._definitions[s]) for s in (ball.own.deflection, ball.own.rate, third)]
             delta, rate = delta - taken[0], rate - taken[1]
-        inner = (ball.deflection, ball.deflection_rate)
         rest = {k: v for k, v in self._definitions.items() if k not in inner}
         law = self._visit.child({ball.deflection: delta, ball.deflection_rate: rate}, rest)
         force = sp.sympify(rest[ball.force]).xreplace({k: v for k, v in rest.items() if k != ball.force})
@@ -184,8 +185,9 @@ class BallBuilder:
         return {
             "delta": delta,
             "rate": rate,
+            "weights": ca.vertcat(*(at(self._definitions.get(w, w)) for w in ball.weights)),
             "own_rate": taken[1],
-            "own_third": taken[2],
+            "own_acceleration": taken[2],
             "F": law(ball.force),
             "Fd": law(by[0]),
             "Fv": law(by[1]),
@@ -201,70 +203,55 @@ class BallBuilder:
 
     def _slopes(self, at: dict[str, ca.SX], co: ca.SX, si: ca.SX, by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
         """Rows of G of a ball in a direction."""
-        if self.uneven:
+        if self.general:
             return self._every_slope(at, by_delta, by_rate)
         rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
         if self.bearing.ball.own is not None:
-            moved = -(by_delta * at["own_rate"] + by_rate * at["own_third"])
+            moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
             rows += [moved * co, moved * si]
         return rows
 
-    def _sums(self, at: dict[str, ca.SX], force: str) -> list[ca.SX]:
+    @staticmethod
+    def _sums(at: dict[str, ca.SX], force: str) -> list[ca.SX]:
         """Rows of S."""
-        rows = [at[force] * self.co, at[force] * self.si]
-        return rows + [at[force] * at["own_third"]] * (len(self.bearing.ball.sums) - FORCES)
-
-    @property
-    def _moving(self) -> tuple[ca.SX, ...]:
-        """Entries of r that move, without the direction of the cage."""
-        further = (entry for entry, live in zip(self._further.values(), self._live, strict=True) if live)
-        return (*ca.vertsplit(self.r[1:]), *further)
+        return [at[force] * weight for weight in ca.vertsplit(at["weights"])]
 
     def _every_slope(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
         """Derivatives of the rows of S by the moving entries of r, one after the other, then by the ball's angle.
 
         Forces are those at hand, or those with held sides, whose slopes these are.
         """
-        co, si = self.co, self.si
         force = at["F"] if by_delta is at["Fd"] else at["held"]
-        motion = self._own_motion(at)
-        direction = ca.vertcat(co, si)
-        changes = [ca.jacobian(motion, entry) for entry in self._moving]
-        changes.append(ca.jtimes(motion, direction, ca.vertcat(-si, co)))
+        motion, direction = self._motion(at), ca.vertcat(self.co, self.si)
+        changes = [ca.jacobian(motion, entry) for entry in self._moving if entry is not None]
+        changes.append(ca.jtimes(motion, direction, ca.vertcat(-self.si, self.co)))
         rows = []
         for change in changes:
             moved = by_delta * change[0] + by_rate * change[1]
-            rows += [moved * co, moved * si]
-            if len(self.bearing.ball.sums) > FORCES:
-                rows.append(moved * at["own_third"] + force * change[2])
-        angle = rows[-len(self.bearing.ball.sums) :]
-        return [*rows[: -len(angle)], angle[0] - force * si, angle[1] + force * co, *angle[2:]]
+            rows += ca.vertsplit(moved * at["weights"] + force * change[2:])
+        return rows
 
     def by_relative(self, sums: ca.SX, totals: ca.SX, r: ca.SX) -> ca.SX:
         """d(S)/d(r) from the sums and the totals of the slopes' rows."""
-        if not self.uneven:
+        if not self.general:
             return ring_motion_slopes().by_relative(sums, totals, r)
         count = sums.numel()
-        columns = ca.horzsplit(ca.reshape(totals, count, totals.numel() // count))
-        turn, further = columns[-1], iter(columns[RINGS - 1 : -1])
-        return ca.horzcat(
-            ca.SX(count, 1),
-            *columns[: RINGS - 1],
-            -r[RINGS + 1] * turn,
-            r[RINGS] * turn,
-            *(next(further) if live else ca.SX(count, 1) for live in self._live),
-        )
+        *columns, turn = ca.horzsplit(ca.reshape(totals, count, totals.numel() // count))
+        moving = iter(columns)
+        by_r = ca.horzcat(*(ca.SX(count, 1) if entry is None else next(moving) for entry in self._moving))
+        by_r[:, RINGS], by_r[:, RINGS + 1] = -r[RINGS + 1] * turn, r[RINGS] * turn
+        return by_r
 
     def by_time(self, totals: ca.SX) -> ca.SX:
         """Time derivative of S at fixed state and r: what effects take while rings turn evenly."""
-        evenly = self.bearing.ball.own is not None and not self.uneven
+        evenly = self.bearing.ball.own is not None and not self.general
         return totals[6:8] if evenly else ca.SX(len(self.bearing.ball.sums), 1)
 
     @property
     def slopes(self) -> int:
         """Entries of G."""
-        if self.uneven:
-            return len(self.bearing.ball.sums) * (len(self._moving) + 1)
+        if self.general:
+            return len(self.bearing.ball.sums) * (sum(entry is not None for entry in self._moving) + 1)
         return 6 if self.bearing.ball.own is None else 8
 
     def kernels(self, c: ca.SX, p: ca.SX, w: ca.SX) -> BallKernels:
@@ -273,7 +260,7 @@ class BallBuilder:
         sums = self._sums(at, "F")
         slopes = self._slopes(at, co, si, at["Fd"], at["Fv"])
         # the kernels of balls that stand in no effect's way take the rings' motion alone
-        turned = [ca.SX.sym("turned", RELATIVE - RINGS)] if self.uneven else []
+        turned = [ca.SX.sym("turned", RELATIVE - RINGS)] if self.general else []
         takes = {"co": co, "si": si, "r": ca.vertcat(self.r, *turned, *self._further.values())}
         whole = {"p": p, "c": c, "w": w}
 
@@ -311,7 +298,7 @@ class BallBuilder:
         if self._opposite is not None:
             # each ball's rows and then their sum, as single runs add them up: the same bits
             to = self._opposite
-            both = [one + other for one, other in zip(sums, [to["F"] * -co, to["F"] * -si], strict=True)]
+            both = [one + other for one, other in zip(sums, self._sums(to, "F"), strict=True)]
             behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
             joint = [one + other for one, other in zip(slopes, behind, strict=True)]
             over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}

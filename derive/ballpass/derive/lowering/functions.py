@@ -19,7 +19,6 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.lowering.ball_kernels import UnfitError
 from ballpass.derive.lowering.jacobians import Described, Group, group_functions, partials, tangent
 from ballpass.derive.lowering.kernels import KernelBuilder, Kernels
 from ballpass.derive.lowering.mass_matrix import accelerations
@@ -61,7 +60,6 @@ class LoweredFunctions(ShortRepr):
     jacobians: tuple[Described, ...]
     groups: tuple[Group, ...]
     kernels: Kernels | None
-    unfit: str
 
     def __getitem__(self, name: str) -> ca.Function:
         for function, _ in (*self.functions, *self.equations, *self.jacobians):
@@ -181,7 +179,7 @@ class _Lowering:
         for name, outputs in extra.items():
             bodies.append((name, {k: self.visit(e) for k, e in outputs.items()}, "asked for on the side"))
 
-        builder, unfit = self._kernel_builder()
+        builder = self._kernel_builder()
         # whatever is hoisted must be known before the vector of constants is closed
         contacts = [self._contact(bearing) for bearing in system.bearings]
         c, once = self._constants()
@@ -225,7 +223,6 @@ class _Lowering:
             jacobians=tuple(jacobians),
             groups=tuple(groups),
             kernels=builder.kernels(c) if builder else None,
-            unfit=unfit,
         )
 
     def _adding_nothing(self) -> Visitor:
@@ -238,22 +235,18 @@ class _Lowering:
             hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
         )
 
-    def _kernel_builder(self) -> tuple[KernelBuilder | None, str]:
-        """The kernels of the stepper; None, and why, where they do not take this model."""
+    def _kernel_builder(self) -> KernelBuilder | None:
+        """The kernels of the stepper; None where no coordinate moves."""
         if not self.system.coordinates:
-            return None, ""
-        try:
-            builder = KernelBuilder(
-                self.system,
-                self.visit,
-                values=self._values,
-                definitions=self._definitions,
-                constant=self._fixed,
-                arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p},
-            )
-        except UnfitError as fault:
-            return None, str(fault)
-        return builder, ""
+            return None
+        return KernelBuilder(
+            self.system,
+            self.visit,
+            values=self._values,
+            definitions=self._definitions,
+            constant=self._fixed,
+            arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p},
+        )
 
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""

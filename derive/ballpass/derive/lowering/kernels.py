@@ -28,11 +28,7 @@ from itertools import accumulate, pairwise
 import casadi as ca
 import sympy as sp
 
-from ballpass.derive.lowering.ball_kernels import (
-    BallBuilder,
-    BallKernels,
-    UnfitError,
-)
+from ballpass.derive.lowering.ball_kernels import BallBuilder, BallKernels
 from ballpass.derive.lowering.mass_matrix import accelerations
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
@@ -97,11 +93,6 @@ class KernelBuilder:
     visit : visitor of run-time functions
     constant : symbols that do not change during a run
     arguments : symbols of t, x, u, p, by name
-
-    Raises
-    ------
-    UnfitError
-        The model has something that these kernels do not take.
     """
 
     def __init__(
@@ -152,8 +143,6 @@ class KernelBuilder:
         n, x, t = len(system.coordinates), self._arguments["x"], self._arguments["t"]
         bearings = system.bearings
         rings = ca.vertcat(*(b.relative for b in self._balls))
-        if ca.jacobian(ca.vertcat(*(b.relative[0] for b in self._balls)), x).nnz():
-            raise UnfitError("the part of a deflection that no direction changes is expected to be constant")
         counts = [len(b.ball.sums) for b in bearings]
         sums = ca.SX.sym("S", sum(counts))
         known = {s.symbol: sums[k] for k, s in enumerate(s for b in bearings for s in b.ball.sums)}

@@ -330,7 +330,6 @@ class Manifest(ShortRepr):
     bearings: tuple[BearingInfo, ...]
     run: RunInfo
     quantities: tuple[QuantityInfo, ...] = ()
-    unfit: str = ""  # why the stepper's kernels do not take the model; empty where they do
     relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
     usual: tuple[UsualInfo, ...] = ()
     duty: tuple[DutyInfo, ...] = ()

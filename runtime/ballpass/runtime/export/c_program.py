@@ -103,11 +103,6 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
             f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
             f"{folder / 'model.c'}. A scene with a bearing can be exported."
         )
-    if manifest.unfit:
-        raise RequestError(
-            f"{manifest.scene}: the exported program is the project's own stepper, which does not take this scene: "
-            f"{manifest.unfit}. The model's functions are in {folder / 'model.c'}."
-        )
     texts = {
         "scene.h": scene_header(manifest),
         "scene.c": scene_source(manifest),

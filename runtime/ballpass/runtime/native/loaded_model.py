@@ -138,7 +138,7 @@ class LoadedModel(CompiledFunctions):
         return self._locating(LOCATING)
 
     def _locating(self, sources: DriverSources) -> Stepper:
-        if sources not in self._drivers and not self.manifest.unfit and not (self.folder / SWITCHES).is_file():
+        if sources not in self._drivers and not (self.folder / SWITCHES).is_file():
             raise ArtefactError(
                 f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
                 "`ballpass derive`, or leave kinks stepped-over."
@@ -167,15 +167,9 @@ class LoadedModel(CompiledFunctions):
         """What to say where the stepper is asked for and cannot be had."""
         if not self.compiled:
             return without_compiler("The project's own stepper")
-        needs = "This needs the project's own stepper:"
-        if self.manifest.unfit:
-            return (
-                f"{needs} it does not take this scene: {self.manifest.unfit}. Run the model with method cvodes, for "
-                "samples; ensembles, reductions, lives and derivatives of runs are not to be had."
-            )
         return (
-            f"{needs} the folder {self.folder} has no kernels for it. Write the folder again with `ballpass derive`, "
-            "or run the model with method cvodes, for samples."
+            f"This needs the project's own stepper: the folder {self.folder} has no kernels for it. Write the folder "
+            "again with `ballpass derive`, or run the model with method cvodes, for samples."
         )
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:

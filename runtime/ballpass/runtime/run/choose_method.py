@@ -56,10 +56,9 @@ def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
     if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
     if asked == "auto" and model.compiled:
-        reason = f" ({model.manifest.unfit})" if model.manifest.unfit else ""
         warnings.warn(
-            f"{model.manifest.scene}: the generated folder has no kernels for the project's own stepper, which does "
-            f"not take such a scene{reason}. CasADi's functions and integrators run instead: results are the same "
+            f"{model.manifest.scene}: the generated folder has no kernels for the project's own stepper; write it "
+            "again with `ballpass derive`. CasADi's functions and integrators run instead: results are the same "
             "within the tolerance, a simulation takes some ten times as long, and there are no ensembles, reductions "
             "and derivatives of runs. Name the method to run it without this warning.",
             NoKernelsWarning,
@@ -72,9 +71,7 @@ def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
     if asked in STEPPERS:
         missing = (
-            f"it does not take this scene: {model.manifest.unfit}"
-            if model.manifest.unfit
-            else "the generated folder has no kernels for it; write it again with `ballpass derive`"
+            "the generated folder has no kernels for it; write it again with `ballpass derive`"
             if model.compiled
             else f"it needs a C compiler, and none was found. {INSTALL_COMPILER}"
         )
