@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import math
 import re
 import tomllib
@@ -50,8 +51,13 @@ def collected(data: dict[str, Any]) -> Table:
     return Table(Collector(lines=LineIndex(lines={})), (), data)
 
 
-def test_schema_is_one() -> None:
+def test_schema_is_one_and_names_pages_by_their_files() -> None:
     jsonschema.Draft202012Validator.check_schema(VALIDATOR.schema)
+    text = json.dumps(VALIDATOR.schema)
+    pages = set(re.findall(r"docs/[\w/]+\.md", text))
+    assert len(pages) > 4
+    assert all((SCENES.parent / page).is_file() for page in pages)
+    assert "{doc}" not in text
 
 
 @pytest.mark.parametrize("file", sorted(SCENES.glob("*.toml")), ids=lambda file: file.stem)

@@ -6,7 +6,9 @@ rules across keys: a file that it accepts may have faults that are found only wh
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from posixpath import normpath
 from typing import Any
 
 from ballpass.derive.reading.sections import Section, sections
@@ -40,7 +42,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def meaning(key: Key) -> str:
-    """Schema of a key: its description and its bounds."""
+    """What a key means, and its bounds."""
     filled = key.filled({"row ROW": "each row", ", AXIS": "", "AXIS": "each"}).words
     words = f"{filled[:1].upper()}{filled[1:]}"
     return words if not isinstance(key, QuantityKey) or key.bounds is None else f"{words}, {key.bounds}"
@@ -50,7 +52,9 @@ def describe(key: Key) -> str:
     """Text that an editor shows for a key: meaning, unit, example, note."""
     unit = f" [{key.unit}]" if isinstance(key, QuantityKey | VectorKey) and key.unit != "1" else ""
     example = f", as in {key.sample}" if key.example != "" else ""
-    return f"{meaning(key)}{unit}{example}. {key.note[:1].upper()}{key.note[1:]}".rstrip(". ") + "."
+    text = f"{meaning(key)}{unit}{example}. {key.note[:1].upper()}{key.note[1:]}".rstrip(". ") + "."
+    # pages are named as the reference page names them
+    return re.sub(r"\{doc\}`([^`]+)`", lambda page: normpath(f"docs/reference/{page[1]}.md"), text)
 
 
 def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:
