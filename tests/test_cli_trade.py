@@ -4,72 +4,63 @@ from __future__ import annotations
 
 import json
 import math
-import os
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from typer.testing import Result
 
-from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.trade import read_error
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "varying_compliance"
 
 
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder with a short version of a scene."""
-    folder = tmp_path_factory.mktemp("trade")
+@pytest.fixture(scope="module", autouse=True)
+def scene(site: Path) -> None:
+    """A short version of a scene in the working directory."""
     text = (ROOT / "scenes" / f"{NAME}.toml").read_text(encoding="utf-8")
     short = text.replace("cycles = 24 ", "cycles = 3 ").replace("transient_cycles = 20 ", "transient_cycles = 1 ")
     short = short.replace("samples_per_cycle = 2000", "samples_per_cycle = 200")
     assert short != text
-    (folder / f"{NAME}.toml").write_text(short, encoding="utf-8")
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        yield folder
-    finally:
-        os.chdir(before)
+    (site / f"{NAME}.toml").write_text(short, encoding="utf-8")
 
 
-def test_a_trade_prints_what_an_error_costs_and_leaves_figures(place: Path) -> None:
-    done = CliRunner().invoke(app, ["trade", f"{NAME}.toml", "--members", "3"])
+def test_a_trade_prints_what_an_error_costs_and_leaves_figures(ballpass: Callable[..., Result], site: Path) -> None:
+    done = ballpass("trade", f"{NAME}.toml", "--members", "3")
     assert done.exit_code == 0, done.output
     assert "1 % on peak_ball_force: " in done.stdout
     assert "The reference, two methods that agree" in done.stdout
-    results = place / "results" / NAME
+    results = site / "results" / NAME
     for quantity in ("peak_ball_force", "rms_inner_x", "range_inner_y"):
         assert (results / f"trade_{quantity}.png").read_bytes().startswith(b"\x89PNG")
     assert [path.name for path in results.iterdir() if path.suffix != ".png"] == ["trade.md"]
 
 
-def test_a_trade_is_one_json_object_and_follows_its_settings(place: Path) -> None:
+def test_a_trade_is_one_json_object_and_follows_its_settings(ballpass: Callable[..., Result], site: Path) -> None:
     words = ["trade", f"{NAME}.toml", "--members", "2", "--of", "peak_ball_force", "--json", "--no-figures"]
     peaks = []
     for setting in ([], ["--set", "load.force.x=150 N"]):
-        done = CliRunner().invoke(app, [*words, *setting, "--out", "lighter"])
+        done = ballpass(*words, *setting, "--out", "lighter")
         assert done.exit_code == 0, done.output
         data = json.loads(done.stdout)
         assert data["trade"]["members"] == 2
         assert {one["way"]["kinks"] for one in data["trade"]["measured"]} == {"stepped-over", "located"}
         peaks.append(data["trade"]["values"]["peak_ball_force"])
     assert peaks[1] < 0.9 * peaks[0]
-    assert not (place / "lighter").exists()
+    assert not (site / "lighter").exists()
 
 
-def test_run_and_sweep_take_any_quantity_and_refuse_in_the_same_words(place: Path) -> None:
+def test_run_and_sweep_take_any_quantity_and_refuse_in_the_same_words(ballpass: Callable[..., Result]) -> None:
     """And at the same options as the summary's own peak; a name that is none is refused alike."""
     of = ("peak_ball_force", "kurtosis:inner.y", "value:inner.y@240deg", "peak_time:ball.force")
     asked = [word for name in of for word in ("--of", name)]
-    done = CliRunner().invoke(app, ["run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures", "--json"])
+    done = ballpass("run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures", "--json")
     assert done.exit_code == 0, done.output
     summary = json.loads(done.stdout)
     found = {name: one["value"] for name, one in summary["quantities"].items()}
     assert found["peak_ball_force"] == summary["peak_ball_force"]["total"]
-    vary = [
+    vary = (
         "--vary",
         "bearing.clearance=9 um:10 um:2",
         "--set",
@@ -77,34 +68,29 @@ def test_run_and_sweep_take_any_quantity_and_refuse_in_the_same_words(place: Pat
         "--kinks",
         "located",
         "--no-figures",
-    ]
-    swept = CliRunner().invoke(app, ["sweep", f"{NAME}.toml", *asked, *vary, "--json"])
+    )
+    swept = ballpass("sweep", f"{NAME}.toml", *asked, *vary, "--json")
     assert swept.exit_code == 0, swept.output
-    told = CliRunner().invoke(app, ["run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures"])
+    told = ballpass("run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures")
     assert all(any(line.split()[:1] == [name] for line in told.stdout.splitlines()) for name in of)
     said = set()
-    for command in (
-        ["run"],
-        ["run", "--error", "1%"],
-        ["sweep", "--vary", "bearing.clearance=9 um:10 um:2"],
-        ["trade"],
-    ):
-        wrong = CliRunner().invoke(app, [*command[:1], f"{NAME}.toml", *command[1:], "--of", "mx:inner.y"])
+    for command in (["run"], ["run", "--error", "1%"], ["sweep", *vary], ["trade"]):
+        wrong = ballpass(*command[:1], f"{NAME}.toml", *command[1:], "--of", "mx:inner.y")
         assert wrong.exit_code == 2, wrong.output
         said.add(wrong.stderr.partition("error: ")[2])
     assert len(said) == 1
 
 
-def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
+def test_a_named_error_tells_choice_estimate_and_cost(ballpass: Callable[..., Result]) -> None:
     of = ["--of", "peak_ball_force", "--of", "rms:inner.y"]
     arguments = ["run", f"{NAME}.toml", "--error", "1%", *of, "--no-figures"]
-    done = CliRunner().invoke(app, [*arguments, "--json"])
+    done = ballpass(*arguments, "--json")
     assert done.exit_code == 0, done.output
     accuracy = json.loads(done.stdout)["accuracy"]
     assert accuracy["target"] == 0.01
     assert accuracy["estimate"] < 0.01
     assert accuracy["check_time"] > 0.0
-    told = CliRunner().invoke(app, arguments)
+    told = ballpass(*arguments)
     assert "error asked for 1 %" in told.stdout
     for name, factor, unit in (("peak_ball_force", 1.0, "N"), ("rms:inner.y", 1e6, "µm")):
         (row,) = (line.split() for line in told.stdout.splitlines() if line.split()[:1] == [name])
@@ -125,16 +111,18 @@ def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
         (["--error", "1%", "--of", "peak_ball_farce"], "peak_ball_force"),
     ],
 )
-def test_wrong_requests_are_refused_with_exit_code_2(place: Path, arguments: list[str], words: str) -> None:
-    done = CliRunner().invoke(app, ["run", f"{NAME}.toml", "--no-figures", *arguments])
+def test_wrong_requests_are_refused_with_exit_code_2(
+    ballpass: Callable[..., Result], arguments: list[str], words: str
+) -> None:
+    done = ballpass("run", f"{NAME}.toml", "--no-figures", *arguments)
     assert done.exit_code == 2
     assert words in done.output
 
 
-def test_an_error_that_nothing_keeps_is_refused_with_exit_code_1(place: Path) -> None:
+def test_an_error_that_nothing_keeps_is_refused_with_exit_code_1(ballpass: Callable[..., Result]) -> None:
     arguments = ["--no-figures", "--error", "1e-8", "--of", "range_inner_y", "--set", "load.force.x=2 N"]
     arguments += ["--set", "bearing.inner_ring.damping=1 N*s/m"]
-    done = CliRunner().invoke(app, ["run", f"{NAME}.toml", *arguments])
+    done = ballpass("run", f"{NAME}.toml", *arguments)
     assert done.exit_code == 1, done.output
     assert "The best is" in done.output
 
@@ -145,14 +133,14 @@ def test_percent_signs_and_plain_numbers_mean_the_same() -> None:
     assert read_error(None, None, None) is None
 
 
-def test_a_scene_without_a_bearing_has_nothing_to_trade(place: Path) -> None:
+def test_a_scene_without_a_bearing_has_nothing_to_trade(ballpass: Callable[..., Result], site: Path) -> None:
     text = (ROOT / "scenes" / "four_bar.toml").read_text(encoding="utf-8")
     bare = (
         text[: text.index("[bearing]")]
         + text[text.index("[run]") : text.index("outputs = ")]
         + 'outputs = ["drive_torque"]'
     )
-    (place / "bare.toml").write_text(bare, encoding="utf-8")
-    done = CliRunner().invoke(app, ["trade", "bare.toml"])
+    (site / "bare.toml").write_text(bare, encoding="utf-8")
+    done = ballpass("trade", "bare.toml")
     assert done.exit_code == 2
     assert "no bearing" in done.output

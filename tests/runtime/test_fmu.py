@@ -201,19 +201,6 @@ def test_fmu_has_the_bits_of_simulate(exported: Callable[..., Exported], steps: 
     assert np.array_equal(rows, columns(solution, found.outputs))
 
 
-@pytest.mark.long
-def test_fmu_with_rollers_has_the_bits_of_simulate(exported: Callable[..., Exported]) -> None:
-    """The two-way press with a roller bearing on its crank pin, force of every roller included."""
-    found = exported("punching_press_roller", ("mechanism.forces.punch",))
-    times = np.concatenate([[0.0], np.sort(np.random.default_rng(3).uniform(0.0, 0.12, 50)), [0.12]])
-    with found.instance() as one:
-        one.begin(0.12)
-        rows = one.steps(times)
-    solution = found.model.simulate(method="stepper", times=reached(times), duration=0.12)
-    assert "ball.force" in found.outputs
-    assert np.array_equal(rows, columns(solution, found.outputs))
-
-
 def test_two_instances_share_nothing_and_parameters_are_set_between_runs(exported: Callable[..., Exported]) -> None:
     found = press(exported)
     model = found.model
@@ -640,7 +627,9 @@ def test_fmus_connected_by_another_importer_turn_as_one_model(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scene", ["rotor", "four_bar", "varying_compliance", "punching_press_motor"])
+@pytest.mark.parametrize(
+    "scene", ["rotor", "four_bar", "varying_compliance", "punching_press_motor", "punching_press_roller"]
+)
 def test_fmus_of_other_scenes_have_the_bits_of_simulate(exported: Callable[..., Exported], scene: str) -> None:
     from fmpy.validation import validate_fmu
 

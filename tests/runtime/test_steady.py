@@ -23,11 +23,6 @@ PERIOD, RPM = 0.05, math.tau / 60.0
 THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 
 
-@pytest.fixture(scope="module")
-def rotor(make_model: Callable[..., Model]) -> Model:
-    return make_model("varying_compliance")
-
-
 def test_varying_compliance_has_the_state_and_multipliers_of_an_independent_solver(rotor: Model) -> None:
     found = rotor.steady()
     assert found.period == pytest.approx(PERIOD, rel=1e-12)

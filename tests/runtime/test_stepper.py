@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partialmethod
 
-import mpmath
 import numpy as np
 import pytest
 from stepper_methods import FAMILIES
@@ -20,7 +19,6 @@ from ballpass.runtime import IntegrationError, Model, RequestError, Status
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.native import stepper as stepping
 from ballpass.runtime.native.stepper import NAMES, End, Segments, Stepper
-from ballpass.runtime.run import driver_angle
 
 TURN = 2.0 * np.pi
 
@@ -169,50 +167,6 @@ def test_last_output_is_written_however_the_times_round(rotor: Model) -> None:
 
 
 # phases
-
-
-def test_phases_are_exact_after_a_hundred_thousand_turns(press: Model) -> None:
-    numbers = press.numbers()
-    turn = driver_angle.period(press.manifest, numbers.values)
-    with mpmath.workdps(50):
-        for turns in (1, 997, 99_999, 100_000):
-            t = turns * turn
-            found = driver_angle.inputs_at(press.manifest.inputs, numbers.values, t)
-            for value, info in zip(found, press.manifest.inputs, strict=True):
-                if info.kind == "phase":
-                    angle = mpmath.mpf(numbers.values[info.offset]) + mpmath.mpf(numbers.values[info.rate]) * t
-                    away = (mpmath.mpf(value) - angle + mpmath.pi) % (2 * mpmath.pi) - mpmath.pi
-                    assert abs(away) < 1e-9, (info.name, turns)
-            start = numbers.values[press.manifest.mechanism.start_angle]
-            away = (driver_angle.crank_angle(press.manifest, numbers.values, t) - start + np.pi) % TURN - np.pi
-            assert abs(away) < 1e-9
-
-
-def test_five_hundredth_turn_is_a_run_that_starts_there(rotor: Model) -> None:
-    """Motion that forgets its start within a turn shows the phase it believes in: after 500 turns, that of exact
-    arithmetic."""
-    damping = {"bearing.inner_ring.damping": 3000.0}
-    turns, short = 500, 12
-    values = rotor.numbers(damping).values
-    ball_angle, bearing = "bearing.ball_angle", rotor.manifest.bearing
-    phase = next(info for info in rotor.manifest.inputs if info.kind == "phase")
-    assert phase.offset == ball_angle
-    assert bearing is not None
-    with mpmath.workdps(50):
-        passed = mpmath.mpf(values[phase.rate]) * (turns - short) * mpmath.mpf(rotor.period())
-        there = float((mpmath.mpf(values[ball_angle]) + passed) % (2 * mpmath.pi))
-    options = {"method": "stepper-rodas5p", "rtol": 1e-9}
-    long = rotor.simulate(turns, parameters=damping, samples_per_cycle=2, **options)
-
-    def last(angle: float) -> np.ndarray:
-        run_there = rotor.simulate(short, parameters=damping | {ball_angle: angle}, samples_per_cycle=2, **options)
-        return run_there.x[-1, :2]
-
-    difference = np.max(np.abs(last(there) - long.x[-1, :2]))
-    moved = np.max(np.abs(last(there + 1e-6) - last(there)))
-    # of the angle: less than a tenth of a microradian, where the integration's own error ends
-    assert moved > 1e-14
-    assert difference < 0.1 * moved
 
 
 # statuses

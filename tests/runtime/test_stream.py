@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +14,6 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.run import request
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.stream import stream_run
-
-
-@pytest.fixture(scope="module")
-def rotor(make_model: Callable[..., Model]) -> Model:
-    return make_model("varying_compliance")
 
 
 def test_a_streamed_run_has_the_samples_of_one_run(rotor: Model, tmp_path: Path) -> None:
