@@ -558,7 +558,7 @@ def test_a_large_file_is_told_before_it_is_written_and_its_size_behind(
     words = ("run", SCENES / "varying_compliance.toml", "--no-figures", "--out", tmp_path / "out", "--cycles", "3")
     quiet = ballpass(site.folder, *words, "--transient", "1")
     assert "note" not in quiet.stderr
-    monkeypatch.setattr("ballpass.runtime.app.cli.LARGE", 1000)
+    monkeypatch.setattr("ballpass.runtime.app.commands.run.LARGE", 1000)
     told = ballpass(site.folder, *words, "--transient", "1")
     count = len(load_solution(tmp_path / "out" / "solution.nc"))
     assert f"note: {count} samples, about " in told.stderr

@@ -1,0 +1,51 @@
+"""``ballpass derive`` and ``ballpass equations``: the derived equations of a scene, as files or printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.shared import command, complain, warn_of_scene
+from ballpass.runtime.contract import read_manifest
+
+
+def derive(
+    scene: options.SceneFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit code 1 if the folder differs from a new derivation.")
+    ] = False,
+) -> None:
+    """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
+    with command(scene) as stages:
+        import ballpass.derive as deriving
+
+        if check:
+            stages("check")
+            result = deriving.check(scene, out)
+        else:
+            folder = deriving.generate(scene, out, progress=stages)
+            warn_of_scene(read_manifest(folder))
+    if not check:
+        typer.echo(str(folder))
+    elif result.stale:
+        state = f"is stale: {', '.join(result.stale)}" if result.folder.is_dir() else "does not exist"
+        remedy = f"ballpass derive {scene}" + (f" --out {out}" if out is not None else "")
+        complain(f"{result.folder} {state}. Run: {remedy}")
+        raise typer.Exit(1)
+    else:
+        typer.echo(f"{result.folder} is up to date")
+
+
+def equations(scene: options.SceneFile) -> None:
+    """Print the derived equations of a scene as Markdown with LaTeX."""
+    with command(scene):
+        import ballpass.derive as deriving
+
+        text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
+    typer.echo(text, nl=False)

@@ -1,0 +1,115 @@
+"""``ballpass export``: a scene as a program in C or as an FMU.
+
+With ``--fmu --input mechanism.driver.speed`` a scene whose driver turns at constant speed is derived with the speed as
+a table over time, whose rows are equal.  There the driver's angle and speed are states, so that the speed may change.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    check_folder,
+    command,
+    generated_folder,
+    name_of,
+    read_own,
+    warn_of_scene,
+)
+from ballpass.runtime.contract import Manifest, read_artefact
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.export.model_description import SPEED
+
+
+def export(
+    scene: options.SceneOrFolder,
+    c: Annotated[
+        bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
+    ] = False,
+    fmu: Annotated[
+        bool, typer.Option("--fmu", help="An FMU 3.0 for co-simulation, compiled for this machine.")
+    ] = False,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME", help="A load, force, torque or speed that is an input; repeatable."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="Folder or FMU to write; export/<scene>, export/<scene>.fmu if not given."),
+    ] = None,
+) -> None:
+    """Write a scene as a program in C or as an FMU, which run without Python."""
+    with command(scene) as stages:
+        if c == fmu:
+            given = "both formats were" if c else "no format was"
+            raise RequestError(f"export: {given} given. Allowed: --c, a program in C99, or --fmu, an FMU 3.0.")
+        if inputs and not fmu:
+            raise RequestError("export: --input is for --fmu. Values of the C program are set by its interface.")
+        stages("read")
+        target = out if out is not None else Path("export") / (f"{name_of(scene)}.fmu" if fmu else name_of(scene))
+        check_folder(target.parent if fmu else target)
+        if fmu and target.is_dir():
+            raise RequestError(f"--out {target}: this is a folder. Name the FMU to write, as in export/press.fmu.")
+        if fmu and target.suffix != ".fmu":
+            raise RequestError(
+                f"--out {target}: importers take an FMU by its ending. Allowed: a name that ends in .fmu."
+            )
+        manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
+        stages("export the FMU" if fmu else "export")
+        # here, because they import CasADi
+        if fmu:
+            from ballpass.runtime.export.fmu import export_fmu
+
+            if scene.is_file() and _speed_becomes_input(manifest, inputs or ()):
+                with _with_speed_over_time(scene, stages) as folder:
+                    export_fmu(folder, target, inputs=inputs or ())
+            else:
+                export_fmu(generated_folder(scene), target, inputs=inputs or (), manifest=manifest)
+        else:
+            from ballpass.runtime.export.c_program import export_c
+
+            export_c(generated_folder(scene), target, manifest=manifest)
+        warn_of_scene(manifest)
+    typer.echo(str(target))
+
+
+def _speed_becomes_input(manifest: Manifest, inputs: Sequence[str]) -> bool:
+    """Whether the inputs include the driver's speed of a scene in which that speed is constant."""
+    mechanism = manifest.mechanism
+    return mechanism is not None and not mechanism.angle and not {SPEED, "mechanism.driver"}.isdisjoint(inputs)
+
+
+@contextmanager
+def _with_speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
+    """Folder, for the time of the context, of a scene file with its driver's constant speed as a table of time.
+
+    Raises
+    ------
+    RequestError
+        The scene has a feature that a driver with a table of its speed does not allow.
+    """
+    from ballpass.derive import SceneError, generate, read_scene
+
+    mechanism = read_scene(scene).mechanism
+    assert mechanism is not None
+    speed = f"{mechanism.driver.speed.value!r} rad/s"
+    table = {"time": ["0 s", "1 s"], "speed": [speed, speed]}
+    # states of a duty cycle may set the speed by its old name, and are for lives alone
+    changes = {"mechanism": {"driver": {"speed": None, "table": table}}, "duty": None}
+    try:
+        changed = read_scene(scene, changes=changes)
+    except SceneError as error:
+        raise RequestError(
+            f"input {SPEED!r}: with a speed that changes, here [mechanism.driver.table], this scene is refused. Leave "
+            f"the speed a parameter, or correct this:\n{error}"
+        ) from error
+    with tempfile.TemporaryDirectory() as place:
+        yield generate(changed, Path(place) / scene.stem, progress=stages)

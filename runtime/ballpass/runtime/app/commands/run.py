@@ -1,0 +1,315 @@
+"""``ballpass run``: simulate a scene; write solution, summary and figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.load_scene import Asked, read_asked, read_formats
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    can_draw,
+    checked_kinks,
+    command,
+    load_model,
+    note,
+    results_folder,
+    show,
+    show_json,
+    show_parts,
+    size_words,
+    warn,
+)
+from ballpass.runtime.app.commands.trade import read_error
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.locating import Kinks
+    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.run.start import RunEnd
+
+#: Bytes of samples that are written without a remark.
+LARGE = 200_000_000
+
+
+def run(
+    scene: options.SceneOrFolder,
+    cycles: Cycles = None,
+    turns: Annotated[
+        str | None,
+        Option(
+            words="Peaks and rms of the summary are those of as many turns as they take to settle.",
+            shown="settle",
+            choices=("settle",),
+        ),
+    ] = None,
+    duration: Duration = None,
+    transient: Annotated[
+        float | None, Option(words="Turns at the start that summary and figures leave out.", shown="N", least=0.0)
+    ] = None,
+    sample_rate: SampleRate = None,
+    initial: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START",
+            help="Where the run starts: equilibrium, the rings at rest under the load of t = 0, or the solution.nc of "
+            "another run, which continues. Default: as in the scene.",
+        ),
+    ] = None,
+    set_: options.Settings = None,
+    rtol: Rtol = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.",
+        ),
+    ] = None,
+    kinks: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or "
+            "located, so that its steps end there. Default: located at tight tolerances of auto and stepper.",
+        ),
+    ] = None,
+    error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E",
+            help="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
+            "the run is estimated.",
+        ),
+    ] = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--of",
+            metavar="Q",
+            help="Quantity to report, and to which --error applies: peak_ball_force, drive_work. May be repeated.",
+        ),
+    ] = None,
+    all_: Annotated[
+        bool, typer.Option("--all", help="All rows of the summary, with the names of the numbers.")
+    ] = False,
+    out: options.ResultsFolder = None,
+    json_: options.Json = False,
+    figures: options.Figures = True,
+    format_: options.FigureFormats = None,
+) -> None:
+    """Simulate a scene; write solution, summary and figures.
+
+    Derives and compiles what is stale in generated/<scene>. Options not given are those of the scene's run table.
+    A generated folder may stand in place of the scene. It is a program: load only folders you trust.
+    """
+    with command(scene) as stages:
+        # within: an interrupt while they are imported is one of the command
+        from ballpass.runtime.app.summary import add_turns, summarize
+        from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
+        from ballpass.runtime.app.summary_words import stands_out
+        from ballpass.runtime.app.transient_words import transient_words
+        from ballpass.runtime.ask.peaks import run_of
+        from ballpass.runtime.report.report import Report
+        from ballpass.runtime.report.text import show as show_report
+        from ballpass.runtime.run.settle import look_further
+
+        stages("read")
+        formats = read_formats(format_)
+        asked = read_asked(scene, set_, duration, transient)
+        start = _read_start(initial)
+        _check_request(asked, cycles, transient, method, goes_on=start not in (None, "equilibrium"))
+        at_kinks = checked_kinks(kinks, method or asked.run.method, error)
+        target = read_error(error, method, rtol)
+        folder = results_folder(out, scene)
+        figures = figures and can_draw()
+        needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
+        model = load_model(
+            scene,
+            stages,
+            method or asked.run.method,
+            kinks,
+            rtol,
+            overrides=asked.overrides,
+            needs=needs and f"ballpass run {needs}",
+        )
+        stages("simulate")
+        solution = model.simulate(
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            parameters=asked.overrides,
+            method=method,
+            rtol=rtol,
+            kinks=at_kinks,
+            sample_rate=sample_rate,
+            progress=stages.fraction,
+            error=target,
+            of=of if target is not None else None,
+            initial=start,
+        )
+        if solution.nbytes > LARGE:
+            size = size_words(solution.nbytes)
+            note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
+        growth = None
+        if solution.states and model.has_stepper:
+            growth = model.growth(
+                cycles,
+                duration=duration,
+                transient=transient,
+                parameters=asked.overrides,
+                rtol=solution.statistics.rtol,
+                initial=start,
+            )
+            if growth.words:
+                warn(growth.words)
+        longer = None
+        if turns is not None:
+            taken = solution.statistics
+            longer = model.settle(
+                transient=transient,
+                parameters=asked.overrides,
+                method=taken.method,
+                rtol=taken.rtol,
+                initial=start,
+                kinks=cast("Kinks | None", taken.kinks),
+                progress=stages.fraction,
+            )
+            if not longer.settled:
+                warn(longer.words)
+        else:
+            longer = look_further(model, model.numbers(asked.overrides), solution)
+            if longer is not None:
+                own = run_of(model, model.numbers(asked.overrides), solution)
+                own = replace(own, start=longer.reductions.start, transient_cycles=solution.transient_cycles)
+                length = (cycles, duration, transient)
+                for words in transient_words(model, own, longer, asked=length != (None, None, None)):
+                    warn(words)
+        taken = solution.statistics
+        asked_for = (
+            model.quantities(
+                of,
+                cycles,
+                duration=duration,
+                transient=transient,
+                parameters=asked.overrides,
+                method=taken.method,
+                rtol=taken.rtol,
+                initial=start,
+                kinks=cast("Kinks | None", taken.kinks),
+            )
+            if of
+            else {}
+        )
+        stages("write")
+        summary = summarize(model, solution, growth)
+        for words in summary["limits"]:
+            note(words)
+        if asked_for:
+            summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
+        turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
+        if solution.accuracy is not None:
+            summary["accuracy"] = solution.accuracy.plain()
+        summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())
+    if json_:
+        show_json(summary)
+        return
+    table, left_out = render_summary(summary, model.manifest, every=all_)
+    values = {**solution.parameters, **solution.constants}
+    show_report(Report(title=summary["title"], parts=(*stands_out(model.manifest, values, summary), table)))
+    if left_out:
+        show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
+    if asked_for and solution.accuracy is None:
+        show_parts(render_quantities(asked_for))
+    if turned:
+        show_parts(turned)
+    if solution.accuracy is not None:
+        show_parts(render_accuracy(model, solution.accuracy))
+        show_parts(solution.accuracy.words)
+    size = size_words((folder / "solution.nc").stat().st_size)
+    show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
+
+
+def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
+    """Where a run starts, as an option: equilibrium, or a file of a run that continues."""
+    if text is None:
+        return None
+    if text == "equilibrium":
+        return "equilibrium"
+    from ballpass.runtime.run.solution_file import load_solution
+
+    return load_solution(text).end
+
+
+def _check_request(
+    asked: Asked,
+    cycles: float | None,
+    transient: float | None,
+    method: str | None,
+    *,
+    goes_on: bool = False,
+) -> None:
+    """Refuse options that no model allows, before anything is derived or written; `goes_on`: from another run."""
+    from ballpass.runtime.contract.parameters import unknown_name
+    from ballpass.runtime.native.casadi_integrators import METHODS
+
+    known = ("auto", *STEPPERS, *METHODS)
+    if method is not None and method not in known:
+        raise RequestError(f"--method: {unknown_name('method', method, known)}")
+    speed = abs(asked.speed)
+    if cycles is not None and speed == 0.0:
+        raise RequestError(
+            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or a "
+            'time instead of turns: --duration "0.5 s".'
+        )
+    turns = cycles if cycles is not None else asked.run.cycles
+    if turns is None:
+        turns = (asked.run.duration or 0.0) * speed / math.tau
+    dropped = asked.run.transient_cycles if transient is None else transient
+    if dropped > 0.0 and turns <= dropped and not goes_on:
+        raise RequestError(
+            f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
+            f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
+            "(--transient 0)."
+        )
+
+
+def _write_results(
+    model: Model, solution: Solution, summary: dict[str, Any], folder: Path, stages: Stages, *, formats: Sequence[str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Write solution, summary and figures in the place of those of an earlier run.
+
+    Parameters
+    ----------
+    formats : of the figures; none are drawn without any
+
+    Returns
+    -------
+    The summary, and the names of the files.
+    """
+    from ballpass.runtime.app.results import SOLUTION, write_results
+    from ballpass.runtime.plot import CAPTIONS, FORMATS
+    from ballpass.runtime.plot import NAMES as FIGURES
+
+    def write(made: Path) -> dict[str, Any]:
+        solution.save(made / SOLUTION)
+        if formats:
+            from ballpass.runtime.app.figure_run import run_for_figures
+            from ballpass.runtime.plot.gallery import draw_all
+
+            stages("draw")
+            draw_all(model, solution, made, formats, run_for_figures(model, solution))
+        return summary
+
+    endings = ["", *(f"_{bearing.name}" for bearing in model.manifest.bearings if bearing.name)]
+    names = [f"{name}{ending}.{kind}" for name in FIGURES for ending in endings for kind in FORMATS]
+    return write_results(folder, write, figures=[*names, CAPTIONS])
