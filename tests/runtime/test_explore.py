@@ -39,6 +39,13 @@ def peak_ball_force(model: Model, name: str = "ball.force", **run: Any) -> float
     return model.refine_peak(model.simulate(**run).steady(), name).value
 
 
+def life_in_hours(model: Model, name: str, parameters: dict[str, float] | None = None) -> float:
+    """Of a native run [h]; the rings turn at constant speeds."""
+    speed = next(info.ring_speed for info in model.manifest.bearings if f"{info.prefix}life" == name)
+    turns = model.quantities([name], parameters=parameters)[name].value
+    return turns * 2.0 * np.pi / abs(model.numbers(parameters).values[speed]) / 3600.0
+
+
 @pytest.fixture(scope="module")
 def press(make_model: Callable[..., Model]) -> Model:
     return make_model("punching_press")
@@ -72,6 +79,8 @@ def test_keys_on_a_slider_give_the_native_run_and_no_request_leaves(press: Model
     numbers = {"bearing.clearance": clearance * 1e-6}
     assert moved["peak_ball_force"] != own["peak_ball_force"]
     assert moved["peak_ball_force"] == pytest.approx(peak_ball_force(press, parameters=numbers), rel=1e-6)
+    # by trapezoids between samples, where `ballpass life` has Gauss's nodes in the steps
+    assert moved["life"] == pytest.approx(life_in_hours(press, "life", numbers), rel=2e-3)
     assert browser.value("decodeURIComponent(location.hash)") == f"#bearing.clearance={clearance:g}+um"
     assert browser.value("lines()") == [f'--set bearing.clearance="{clearance:g} um"']
     assert browser.asked == [page.as_uri()]
@@ -160,6 +169,11 @@ def test_pages_of_other_machines_give_native_peaks_and_positions(
     solution = model.simulate()
     peak = model.refine_peak(solution.steady(), f"{bearing}ball.force").value
     assert found[f"{bearing}peak_ball_force"] == pytest.approx(peak, rel=1e-6)
+    swings = scene == "toggle_press" or bearing == "pin."
+    assert (f"{bearing}life" in found) is not swings
+    turning = {"rotor": "life", "punching_press_hinges": "main.life"}.get(scene)
+    if turning is not None:
+        assert found[turning] == pytest.approx(life_in_hours(model, turning), rel=2e-3)
     # Positions, forces and angles are those that the page brings of the native run, of five digits.  Not so where the
     # last bit of a number changes a native run by more: 1e-4 of the four-bar's ball forces, what rattles in the toggle.
     own = browser.value("({ brought: numbers, solved: data })") if scene not in ("four_bar", "toggle_press") else {}

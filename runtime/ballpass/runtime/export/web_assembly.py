@@ -19,11 +19,15 @@ from ballpass.runtime.export.c_program import program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind
 from ballpass.runtime.native.compilers import run_compiler
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.quantity.kinds.life import PLACES
+from ballpass.runtime.ratings.of_bearing import ratings_of
 
 #: What a page calls; memory for what it reads is the module's.
 CALLED = (
     *(f"ballpass_{name}" for name in ("make", "value", "set_at", "start", "run_to", "read", "error")),
-    *(f"ballpass_{name}" for name in ("stop", "values", "drawn", "next_switch", "state_size", "save", "restore")),
+    *(f"ballpass_{name}" for name in ("stop", "values", "drawn", "ratings", "next_switch")),
+    *(f"ballpass_{name}" for name in ("state_size", "save", "restore")),
     "malloc",
 )
 
@@ -62,6 +66,7 @@ def web_assembly(model: LoadedModel) -> bytes:
     texts["page.c"] = (STANDALONE / "page.c").read_text(encoding="utf-8")
     texts["simulation.h"] = (STANDALONE / "simulation.h").read_text(encoding="utf-8")
     texts["drawn.c"] = behind("What a page draws", _drawn(symbolic), "scene_drawn", MOMENT, "y")
+    texts["ratings.c"] = behind("Ratings of the bearings", _ratings(symbolic), "scene_ratings", MOMENT[-2:], "y")
     with tempfile.TemporaryDirectory(prefix="ballpass-") as name:
         folder = Path(name)
         for file, text in texts.items():
@@ -72,14 +77,17 @@ def web_assembly(model: LoadedModel) -> bytes:
         return (folder / "model.wasm").read_bytes()
 
 
-def drawn_columns(manifest: Manifest) -> tuple[int, int, int]:
-    """How many numbers `ballpass_drawn` gives: coordinates of points, angles of cages, inputs."""
+def drawn_columns(manifest: Manifest) -> tuple[int, int, int, int]:
+    """How many numbers `ballpass_drawn` gives: points, angles of cages, these as rings see them, inputs.
+
+    Those of a ring are of ball 1 as the ring sees it: of each bearing the outer, then the inner one.
+    """
     points = 0 if manifest.mechanism is None else 2 * len(manifest.mechanism.points)
-    return points, len(manifest.bearings), len(manifest.inputs)
+    return points, len(manifest.bearings), 2 * len(manifest.bearings), len(manifest.inputs)
 
 
 def _drawn(model: LoadedModel) -> casadi.Function:
-    """Points, angles of the cages and inputs, one below the other, over t, x, u, p and c."""
+    """What `drawn_columns` counts, one below the other, over t, x, u, p and c."""
     manifest = model.manifest
     sizes = {
         "t": 1,
@@ -89,10 +97,24 @@ def _drawn(model: LoadedModel) -> casadi.Function:
         "c": len(manifest.constants),
     }
     given = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
-    points, cages, _ = drawn_columns(manifest)
-    rows = []
-    for name, count in (("geometry", points), ("cages", cages)):
-        if count:
-            function = model.symbolic(name)
-            rows.append(casadi.densify(function(*(given[argument] for argument in function.name_in()))))
+    points, cages, *_ = drawn_columns(manifest)
+
+    def values(name: str) -> casadi.SX:
+        function = model.symbolic(name)
+        return casadi.densify(function(*(given[argument] for argument in function.name_in())))
+
+    rows = [values(name) for name, count in (("geometry", points), ("cages", cages)) if count]
+    seen = [f"{bearing.prefix}{place}" for bearing in manifest.bearings for place in PLACES]
+    rows += [values(part.function)[part.indices.tolist()] for name in seen for part in rows_of(model, name)]
     return casadi.Function("drawn", [*given.values()], [casadi.vertcat(*rows, given["u"])], [*given], ["y"])
+
+
+def _ratings(model: LoadedModel) -> casadi.Function:
+    """Q_ci and Q_ce of every bearing, one below the other, over p and c."""
+    manifest = model.manifest
+    names = {"p": [info.name for info in manifest.parameters], "c": [info.name for info in manifest.constants]}
+    given = {kind: casadi.SX.sym(kind, len(some)) for kind, some in names.items()}
+    known = {name: given[kind][k] for kind, some in names.items() for k, name in enumerate(some)}
+    found = [ratings_of(bearing, known) for bearing in manifest.bearings]
+    rows = [load for one in found for load in (one.inner_ball, one.outer_ball)]
+    return casadi.Function("ratings", [*given.values()], [casadi.vertcat(*rows)], [*given], ["y"])

@@ -94,6 +94,8 @@ function resultsOf(run) {
     const name = numbers.bearings[k].name, of = name && ` of ${name}`, id = name && `${name}.`;
     const force = peak(`${id}peak_ball_force`, `Highest ${numbers.bearings[k].noun} force${of}`, "N", (row) => { let most = -Infinity; for (const column of bearing.force) if (row[column] > most) most = row[column]; return most; });
     rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ${numbers.bearings[k].noun}${of}`, "N", rms(run, force));
+    const life = bearing.life ? lifeOf(run, bearing) : 0;
+    if (life) found.push({ key: `${id}life`, words: `Rating life${of}, 90 % of such bearings run longer`, unit: "h", value: life, digits: 3 });
     if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing.load, row)))));
     peak(`${id}peak_motion`, `Furthest that the rings are apart${of}`, "\u00b5m", (row) => length(motionOf(bearing, row)));
     const parts = [0, 1].map((axis) => measured(run, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));
@@ -124,8 +126,9 @@ function showResults(results, olds) {
   results.forEach((one, k) => {
     const row = element(body, "tr");
     element(row, "td", `${one.words}${one.where ? `, ${one.where}` : ""} [${one.unit}]`);
-    element(row, "td", one.value.toPrecision(5), { "data-result": one.key, "data-value": one.value });
-    element(row, "td", olds[k].value.toPrecision(5));
+    const digits = one.digits ?? 5;
+    element(row, "td", written(one.value, digits), { "data-result": one.key, "data-value": one.value });
+    element(row, "td", written(olds[k].value, digits));
     element(row, "td", difference(one.value, olds[k].value));
   });
   const one = results[0];

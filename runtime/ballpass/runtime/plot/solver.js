@@ -2,7 +2,8 @@
 // ------------------------------------------------------------------------------------------------------------- solver
 // The exported C program, compiled to WebAssembly: a run of given numbers, and what of it is drawn.
 const solver = numbers.solver, width = solver.columns.length + solver.drawn.reduce((sum, count) => sum + count, 0);
-const [pointsAt, cagesAt, inputsAt] = [0, solver.drawn[0], solver.drawn[0] + solver.drawn[1]].map((far) => solver.columns.length + far);
+let far = solver.columns.length;
+const [pointsAt, cagesAt, seenAt, inputsAt] = solver.drawn.map((count) => { far += count; return far - count; });
 const TURN = 2 * Math.PI, DEGREE = Math.PI / 180;
 let machine = null;
 
@@ -14,8 +15,8 @@ async function loadSolver() {
   for (const { module: space, name } of WebAssembly.Module.imports(module)) (system[space] ??= {})[name] = () => 52;
   const { exports } = await WebAssembly.instantiate(module, system);
   exports._initialize?.();
-  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), saved: exports.malloc(exports.ballpass_state_size()) };
-  if (!machine.one || !machine.row || !machine.saved) throw new Error("The memory is too small for the solver.");
+  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), ratings: exports.malloc(16 * solver.bearings.length + 8), saved: exports.malloc(exports.ballpass_state_size()) };
+  if (!machine.one || !machine.row || !machine.ratings || !machine.saved) throw new Error("The memory is too small for the solver.");
 }
 
 const inMemory = (place, count) => new Float64Array(machine.memory.buffer, place, count);
@@ -76,7 +77,9 @@ async function solve(values, stale) {
     for (; jump < jumps.length && jumps[jump][0] === k; jump += 1) nodes.push(jumps[jump][1]);
     nodes.push(rows.subarray(k * width, (k + 1) * width));
   }
-  return { values, known, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
+  machine.ballpass_ratings(machine.one, machine.ratings);
+  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice();
+  return { values, known, ratings, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
 }
 
 // Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.
@@ -91,6 +94,43 @@ function measured({ nodes }, measure) {
   return values;
 }
 const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * value)));
+
+// Rating life of a bearing [h], the shortest of the readings of `ballpass life`, over the passes of this run; 0 where its
+// rings do not turn against each other.
+function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors } }) {
+  const seen = (node, ring) => node[seenAt + 2 * cage + ring], apart = nodes.map((node) => seen(node, 0) - seen(node, 1));
+  // how far the rings turn from one node to the next; angles of cages come back after a turn
+  const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
+  const fields = [0, 1].map(() => new Float64Array(sectors + 1)), sums = [0, 0, 0], last = nodes.length - 1;
+  let passes = 0;
+  nodes.forEach((node, k) => { // trapezoids over the passes
+    const weight = 0.5 * (Math.abs(turned[k]) + (k < last ? Math.abs(turned[k + 1]) : 0));
+    let [one, other] = [0, 0];
+    passes += weight;
+    force.forEach((column, ball) => {
+      const load = node[column];
+      if (!(load > 0)) return;
+      const power = load ** turning;
+      one += power;
+      other += load ** standing;
+      fields.forEach((field, ring) => {
+        const turns = seen(node, ring) / TURN + ball / force.length, place = sectors * (turns - Math.floor(turns)), below = Math.min(Math.floor(place), sectors - 1);
+        field[below] += weight * power * (below + 1 - place);
+        field[below + 1] += weight * power * (place - below);
+      });
+    });
+    [one, other, (other / force.length) ** (1 / weibull) * force.length].forEach((power, n) => { sums[n] += weight * power; });
+  });
+  if (!(Math.abs(turned.reduce((sum, angle) => sum + angle)) > 0.5 * passes)) return 0;
+  const [inner, mean, miner] = sums.map((sum, n) => (sum / (passes * force.length)) ** (1 / [turning, standing, turning][n]));
+  const [onOuter, onInner] = fields.map((field) => {
+    field[0] += field[sectors];
+    return (field.subarray(0, sectors).reduce((sum, power) => sum + (sectors * power / (passes * force.length)) ** weibull, 0) / sectors) ** (1 / standing);
+  });
+  const turns = ([first, second]) => 1e6 * ((first / ratings[2 * cage]) ** standing + (second / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
+  const speed = passes / (nodes[last][0] - nodes[0][0]);
+  return Math.min(...[[inner, mean], [inner, miner], [onInner, onOuter]].map(turns)) * TURN / speed / 3600;
+}
 
 // Highest values of measures of a sample, between samples too: the steps do not depend on what is read.
 function peaks(run, measures, series) {

@@ -14,8 +14,10 @@ from typing import Any
 from ballpass.runtime.contract import BearingInfo, Manifest, force_components, table_direction
 from ballpass.runtime.export.scene_numbers import columns_of
 from ballpass.runtime.export.web_assembly import drawn_columns
+from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
+from ballpass.runtime.ratings.of_bearing import rated_element
 
 
 def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]:
@@ -135,4 +137,16 @@ def _bearing(
         "inner": pair(own("inner")),
         "outer": pair(own("outer")),
         "load": load,
+        "life": _life(bearing) if force.endswith("ball.force") else None,
+    }
+
+
+def _life(bearing: BearingInfo) -> dict[str, float]:
+    """How a life depends on the loads; see `ballpass.runtime.ratings.life.ElementLife`."""
+    of = rated_element(bearing).life
+    return {
+        "turning": float(of.turning),
+        "standing": float(of.standing),
+        "weibull": float(of.weibull),
+        "sectors": SECTORS,
     }
