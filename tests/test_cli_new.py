@@ -42,7 +42,8 @@ from typer.testing import CliRunner
 from ballpass.runtime.app.cli import app
 needed = {"of": "q", "out": "o", "sample_rate": "1 kHz", "vary": "a=1:2:3", "wrt": "p", "minimize": "q"}
 for name, command in get_command(app).commands.items():
-    options = [w for p in command.params if p.required and p.name in needed for w in (p.opts[0], needed[p.name])]
+    asked = [p for p in command.params if p.required or (getattr(p, "help", None) or "").endswith("Required.")]
+    options = [w for p in asked if p.name in needed for w in (p.opts[0], needed[p.name])]
     options += [] if name == "bearings" else ["rotor.toml" if name != "new" else "rotor"]
     if name in ("export", "sweep"):
         options += {"export": ["--c"], "sweep": ["--vary", "a=1:2:3"]}[name]

@@ -183,3 +183,11 @@ def test_an_interrupt_within_cvodes_is_one(make_model: Callable[..., Model]) -> 
     with pytest.raises(KeyboardInterrupt):
         model.simulate(cycles=3000, transient=0, method="cvodes", samples_per_cycle=20, rtol=1e-11, progress=begin)
     assert timers
+
+
+def test_a_command_without_an_option_that_it_needs_says_what_the_option_takes(
+    ballpass: Callable[..., Result],
+) -> None:
+    done = ballpass("spectrum", SCENE)
+    assert (done.exit_code, done.stderr.count("is missing")) == (2, 1)
+    assert "--of is missing. It takes: output or state of the scene with one value" in done.stderr

@@ -247,7 +247,7 @@ def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
         what = "quantity" if quantity.value == 0.0 else "parameter"
         rows += [(Marked(f"{what} is 0: no % per %", "head"),), *_rows(zero, judged=judged)]
     return ReportTable(
-        title=_title(quantity),
+        title=_title(quantity, report.words.get(quantity.name, "")),
         heads=("parameter", "% per %", "derivative", *(["verdict"] if judged else [])),
         rows=rows,
         right=("% per %",),
@@ -278,8 +278,8 @@ def _bounded(pair: Sensitivity) -> bool:
     return pair.check.bounded and not pair.is_nothing
 
 
-def _title(quantity: QuantityValue) -> str:
-    words = f"{quantity.name} = {quantity.value:.6g} {quantity.unit}"
+def _title(quantity: QuantityValue, described: str) -> str:
+    words = f"{described}\n{quantity.name} = {quantity.value:.6g} {quantity.unit}".lstrip()
     if quantity.time is not None:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:

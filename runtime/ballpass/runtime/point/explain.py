@@ -117,10 +117,10 @@ class Explanation(ShortRepr, Reported):
 
     def _report(self) -> Report:
         where = "; ".join(f"{math.degrees(item.angle):.4g}° {item.cause}" for item in self.breakpoints) or "none"
-        laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "no contact laws"
+        laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "none"
         parts: list[Words | ReportTable] = [
-            Marked("Breakpoints of the first turn", "head", f" {where}"),
-            Marked("Smoothness", "head", f" {laws}"),
+            Marked("Breakpoints of the first turn", "head", f": {where}"),
+            Marked("Smoothness of the contact laws", "head", f": {laws}"),
         ]
         right = (
             "crank or\nshaft angle",
@@ -150,9 +150,9 @@ class Explanation(ShortRepr, Reported):
         )
         parts += ["", table] if rows else []
         parts += [f"no equilibrium at {place}" for place in self.unsupported]
-        parts += ["", Marked("Method", "head", f" auto takes {self.method}: {self.reason}")]
-        parts += [Marked("unusual", "doubt", f" {words}") for words in self.unusual]
-        parts += [Marked("Limits", "doubt", f" {words}") for words in self.limits]
+        parts += ["", Marked("Method", "head", f": auto takes {self.method}, {self.reason}")]
+        parts += [Marked("Unusual", "doubt", f": {words}") for words in self.unusual]
+        parts += [Marked("Limits", "doubt", f": {words}") for words in self.limits]
         scales = [
             asdict(item) | {"angle_deg": math.degrees(item.angle), "stiffness": item.stiffness} for item in self.scales
         ]

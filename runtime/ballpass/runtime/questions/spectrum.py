@@ -33,6 +33,14 @@ WIDTHS = 3.0
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
+#: What the short names of characteristic frequencies stand for.
+MEANINGS = {
+    "FTF": "turns of the cage",
+    "BPFO": "balls passing a place of the outer raceway",
+    "BPFI": "balls passing a place of the inner raceway",
+    "2 BSF": "a place of a ball meeting either raceway",
+}
+
 SampleRate = Annotated[
     float | None,
     Option(
@@ -180,8 +188,11 @@ class SignalSpectrum(ShortRepr, Reported):
             right=(across, height),
         )
         marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
-        s = self.statistics
-        said = [f"{marks}{'' if self.orders else ' Hz'}; lines {self.resolution:.3g} apart"] if marks else []
+        unit, s = "" if self.orders else " Hz", self.statistics
+        said = [f"{marks}{unit}; lines of the spectrum are {self.resolution:.3g}{unit} apart"] if marks else []
+        names = dict.fromkeys(mark.name for mark in self.marks)
+        abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
+        said += [abbreviated] if abbreviated else []
         said.append(
             f"rms {s.rms:.4g} {self.unit}, peak {s.peak:.4g} {self.unit}, crest factor {s.crest_factor:.3g}, kurtosis "
             f"{s.kurtosis:.3g}, skewness {s.skewness:.3g}"

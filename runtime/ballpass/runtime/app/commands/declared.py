@@ -40,9 +40,11 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """The command of a function; typer's own options among its parameters stay as they are."""
     own = inspect.signature(function, eval_str=True).parameters
     kinds = options_in({name: item.annotation for name, item in own.items()})
+    required = [name for name in kinds if own[name].default is inspect.Parameter.empty]
 
     def call(**given: Any) -> None:
         with command(given.get("scene")):
+            _refuse_missing({name: kinds[name][1] for name in required if not given[name]})
             values = _read(kinds, given)
         function(**{**given, **values})
 
@@ -71,6 +73,15 @@ def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
         _ask(ask, question, values, **given)
 
     return as_command(_with_signature(call, question.name, summary_of(ask), parameters))
+
+
+def _refuse_missing(missing: Mapping[str, Option]) -> None:
+    """RequestError with the words of the options that were not given: those that say what to write."""
+    if missing:
+        helps = {option.flag(name): option.help(name) for name, option in missing.items()}
+        raise RequestError(
+            "\n".join(f"{flag} is missing. It takes: {words[:1].lower()}{words[1:]}" for flag, words in helps.items())
+        )
 
 
 def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -130,7 +141,10 @@ def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> in
         argument = typer.Argument(metavar=option.shown, help=option.words, show_default=False)
         return parameter.replace(annotation=Annotated[kind, argument])
     flags = option.flags or (option.flag(parameter.name),)
-    info = typer.Option(*flags, metavar=option.shown, help=option.help(parameter.name))
+    words = option.help(parameter.name)
+    if required:  # asked for by `_refuse_missing`, which says what to write
+        kind, parameter, words = kind | None, parameter.replace(default=None), f"{words} Required."
+    info = typer.Option(*flags, metavar=option.shown, help=words)
     return parameter.replace(annotation=Annotated[kind, info])
 
 

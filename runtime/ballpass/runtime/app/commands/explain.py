@@ -163,10 +163,10 @@ def _absent(scene: Scene) -> list[str]:
 def _render(report: dict[str, Any], said: Explanation) -> Report:
     parts: list[Words | ReportTable] = ["", _modelled(report), "", Marked("Not modelled", "head")]
     parts += [f"  - {text}" for text in report["not_modelled"]]
-    parts += ["", Marked("States", "head", f" {', '.join(report['states']) or 'none'}"), "", _functions(report)]
+    parts += ["", Marked("States", "head", f": {', '.join(report['states']) or 'none'}"), "", _functions(report)]
     if report["step"]:
         shares = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
-        words = f" {report['step']['all']} operations: {shares}"
+        words = f": {report['step']['all']} operations ({shares})"
         parts += ["", Marked("One evaluation in the stepper", "head", words)]
     parts += ["", *said.report().parts]
     return Report(title=report["title"], parts=parts)

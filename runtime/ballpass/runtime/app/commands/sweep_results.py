@@ -212,7 +212,17 @@ class Sweep:
             cells = [f"{value / one.factor:z.5g}" for one, value in values]
             cells += [self._cell(name, float(column.flat[member]), member) for name, (column, _) in columns.items()]
             rows.append(cells)
-        return ReportTable(title=self.result.manifest.title, heads=heads, rows=rows, right=heads[len(self.ranges) :])
+        return ReportTable(
+            title=self.result.manifest.title,
+            heads=heads,
+            rows=rows,
+            right=heads[len(self.ranges) :],
+            caption=self._words(),
+        )
+
+    def _words(self) -> str:
+        """What the quantities are."""
+        return "\n".join(f"{name}: {self._attributes[name]['long_name']}" for name in self.result.observables)
 
     def extremes(self) -> ReportTable:
         """Smallest and largest value of each quantity, and where."""
@@ -226,7 +236,9 @@ class Sweep:
             rows.append((name, "min", self._cell(name, values.flat[lowest], lowest), unit, self.place(lowest)))
             rows.append(("", "max", self._cell(name, values.flat[highest], highest), unit, self.place(highest)))
         heads = ("quantity", "", "value", "unit", "at")
-        return ReportTable(title=self.result.manifest.title, heads=heads, rows=rows, right=("value",))
+        return ReportTable(
+            title=self.result.manifest.title, heads=heads, rows=rows, right=("value",), caption=self._words()
+        )
 
 
 def _head(name: str, unit: str) -> str:
