@@ -103,23 +103,25 @@ function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, we
   const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
   const fields = [0, 1].map(() => new Float64Array(sectors + 1)), sums = [0, 0, 0], last = nodes.length - 1;
   let passes = 0;
-  nodes.forEach((node, k) => { // trapezoids over the passes
-    const weight = 0.5 * (Math.abs(turned[k]) + (k < last ? Math.abs(turned[k + 1]) : 0));
-    let [one, other] = [0, 0];
+  nodes.forEach((node, k) => { // trapezoids over the passes; loops without closures, for a slider that moves
+    const weight = 0.5 * (Math.abs(turned[k]) + (k < last ? Math.abs(turned[k + 1]) : 0)), angles = [seen(node, 0), seen(node, 1)];
+    let one = 0, other = 0;
     passes += weight;
-    force.forEach((column, ball) => {
-      const load = node[column];
-      if (!(load > 0)) return;
-      const power = load ** turning;
+    for (let ball = 0; ball < force.length; ball += 1) {
+      const load = node[force[ball]];
+      if (!(load > 0)) continue;
+      const power = turning === 3 ? load * load * load : load ** turning;
       one += power;
-      other += load ** standing;
-      fields.forEach((field, ring) => {
-        const turns = seen(node, ring) / TURN + ball / force.length, place = sectors * (turns - Math.floor(turns)), below = Math.min(Math.floor(place), sectors - 1);
-        field[below] += weight * power * (below + 1 - place);
-        field[below + 1] += weight * power * (place - below);
-      });
-    });
-    [one, other, (other / force.length) ** (1 / weibull) * force.length].forEach((power, n) => { sums[n] += weight * power; });
+      other += power ** weibull;
+      for (let ring = 0; ring < 2; ring += 1) {
+        const turns = angles[ring] / TURN + ball / force.length, place = sectors * (turns - Math.floor(turns)), below = Math.min(Math.floor(place), sectors - 1);
+        fields[ring][below] += weight * power * (below + 1 - place);
+        fields[ring][below + 1] += weight * power * (place - below);
+      }
+    }
+    sums[0] += weight * one;
+    sums[1] += weight * other;
+    sums[2] += weight * (other / force.length) ** (1 / weibull) * force.length;
   });
   if (!(Math.abs(turned.reduce((sum, angle) => sum + angle)) > 0.5 * passes)) return 0;
   const [inner, mean, miner] = sums.map((sum, n) => (sum / (passes * force.length)) ** (1 / [turning, standing, turning][n]));
