@@ -38,7 +38,7 @@ bodies = ["frame", "wheel"]
 
 [run]
 duration = "3 s"
-outputs = ["driver.*", "friction.*"]
+outputs = ["driver.*", "friction.*", "dissipated_power"]
 
 [mechanism.friction.pin]
 joint = "A"
@@ -55,6 +55,8 @@ def test_a_wheel_runs_down_by_viscous_friction_exponentially_and_by_coulomb_fric
     for name, without in (("viscous", "torque"), ("coulomb", "viscous")):
         run = model.simulate(rtol=1e-11, parameters={f"mechanism.friction.pin.{without}": 0.0})
         speeds[name] = run["driver.speed"]
+        taken = {"viscous": 0.02 * speeds[name] ** 2, "coulomb": 0.8 * speeds[name] * np.tanh(speeds[name] / 0.5)}
+        assert run["dissipated_power"] == pytest.approx(taken[name], rel=1e-12)
     assert speeds["viscous"] == pytest.approx(SPEED * np.exp(-0.02 / INERTIA * run.t), rel=1e-9)
     slope = 0.8 / INERTIA
     straight = SPEED - slope * run.t

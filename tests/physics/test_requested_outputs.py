@@ -21,7 +21,16 @@ from ballpass.runtime.run.request import on_request
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MOTION = ("*inner.a[xy]", "*outer.a[xy]", "point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude")
-POWER = ("*.power", "*.loss", "*kinetic_energy", "*.energy", "*cage.moment", "drive_power")
+POWER = (
+    "*.power",
+    "*.loss",
+    "*_energy",
+    "*.energy",
+    "*cage.moment",
+    "drive_power",
+    "applied_power",
+    "dissipated_power",
+)
 HERTZ = ("contact.stiffness.*", "ball.stiffness", "ball.*_pressure", "ball.*_axis", "ball.*_approach")
 
 SPRINGS = """[mechanism.springs.return]
@@ -170,6 +179,11 @@ def test_the_balance_of_every_joule_closes(which: str) -> None:
             turned = values["at_A.cage.moment"] * rates["at_A.cage.in_outer"]
             assert turned - along == pytest.approx(values["at_A.contact.power"], rel=1e-8)
             assert near["kinetic_energy"] + sum(stored.values()) == pytest.approx(given, abs=1e-8 * scale)
+            # the same by the sums alone
+            given = values["applied_power"] - values["dissipated_power"]
+            assert near["total_energy"] == pytest.approx(given, abs=1e-8 * scale)
+            assert summed == pytest.approx(values["dissipated_power"], rel=1e-12)
+        assert ("total_energy" in values) is (which != "one-way")
         assert min(losses) >= 0.0
 
 

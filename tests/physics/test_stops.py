@@ -42,7 +42,8 @@ CUT = "[mechanism.forces.cut]\n"
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Model:
     folder = tmp_path_factory.mktemp("wheel")
-    text = WHEEL.partition("[mechanism.friction")[0].replace("friction.*", "torsion_stop.*") + STOPS
+    text = WHEEL.partition("[mechanism.friction")[0]
+    text = text.replace('friction.*"', 'torsion_stop.*", "total_energy", "dissipated_power"') + STOPS
     (folder / "wheel.toml").write_text(text)
     return load(generate(folder / "wheel.toml", folder / "model"))
 
@@ -75,6 +76,11 @@ def test_hysteresis_takes_the_energy_of_hunt_and_crossley(wheel: Model) -> None:
     back, loss = -run["driver.speed"][-1] / SPEED, 0.2 * SPEED
     assert 0.7 < back < 0.9
     assert loss * (1.0 + back) == pytest.approx(math.log((1.0 + loss) / (1.0 - loss * back)), rel=1e-9)
+    values = {"mechanism.driver.speed": SPEED, OF_UP + "hysteresis": 0.2}
+    options = {"rtol": 1e-11, "duration": 0.4, "transient": 0, "parameters": values}
+    taken = wheel.quantities(["integral:dissipated_power"], **options)["integral:dissipated_power"].value
+    assert taken == pytest.approx(0.5 * INERTIA * SPEED**2 * (1.0 - back**2), rel=1e-7)
+    assert run["total_energy"][0] - run["total_energy"][-1] == pytest.approx(taken, rel=1e-7)
 
 
 def test_derivatives_of_a_bounce_are_those_of_its_closed_form(wheel: Model) -> None:

@@ -8,6 +8,8 @@ Powers are positive where they add to the machine's kinetic energy; losses are w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
 
 import sympy as sp
 
@@ -25,6 +27,8 @@ from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
 Words = tuple[str, sp.Expr, str, str]
+
+APPLIED = "Power of the drive, forces and torques, and of loads on rings loaded one-way"
 
 
 def _made(rows: Iterable[Words]) -> list[Output]:
@@ -89,6 +93,38 @@ def power_outputs(
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2
     out.append(("kinetic_energy", energy, "J", "Kinetic energy of all moving parts, without rings loaded one-way"))
     return _made(out)
+
+
+def balance_outputs(outputs: Sequence[Output]) -> list[Output]:
+    """Sums of what is named one by one: energy of all kinds, the power that changes it, and what dampers take.
+
+    Parameters
+    ----------
+    outputs : all of a scene
+    """
+
+    def named(*patterns: str, sign: int = 1) -> list[Output]:
+        return [
+            o if sign > 0 else replace(o, expression=-o.expression)
+            for o in outputs
+            if not o.per_ball and any(fnmatchcase(o.name, pattern) for pattern in patterns)
+        ]
+
+    lost = [*named("*.loss"), *named("friction.*.power", "guide_friction.*.power", sign=-1)]
+    rows = [
+        ("applied_power", named("drive_power", "force.*.power", "torque.*.power", "*load.power"), "W", APPLIED),
+        ("dissipated_power", lost, "W", "Power that all dampers and frictions take"),
+    ]
+    energies = named("*.energy", "*kinetic_energy")
+    # a smoothed onset has no potential energy by name; balls of rings loaded one-way take work from no body
+    without = {o.balls_of for o in outputs if o.per_ball} - {o.balls_of for o in energies}
+    if not without and not named("*load.power"):
+        rows.append(("total_energy", energies, "J", "Kinetic and potential energy of all parts"))
+    return [
+        Output(name=name, expression=sp.S.Zero, unit=unit, description=words, parts=tuple(parts))
+        for name, parts, unit, words in rows
+        if parts
+    ]
 
 
 def ring_outputs(model: BearingModel) -> list[Output]:

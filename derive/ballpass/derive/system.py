@@ -36,6 +36,7 @@ from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.requested import (
+    balance_outputs,
     bearing_power_outputs,
     contact_outputs,
     motion_outputs,
@@ -451,6 +452,7 @@ def _system(
         mass = sp.ImmutableMatrix(sp.diag(mass, 1))
         forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([drive.acceleration])))
     outputs: tuple[Output, ...] = ()
+    requested = (*requested, *balance_outputs((*quantities, *requested)))
     with _noted(errors):
         outputs = select_outputs(quantities, requested, scene.outputs)
     known = {o.name for o in quantities}

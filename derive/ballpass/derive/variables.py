@@ -119,8 +119,8 @@ class Output:
     """Something a run can report.
 
     `per_ball` outputs have one value for each ball of the bearing with the prefix `balls_of` and use the symbols of its
-    generic ball; with `over_balls` the output is the sum of these.  `constants` are derived constants that only this
-    output needs.
+    generic ball; with `over_balls` the output is the sum of these.  `parts` are further outputs that are added to
+    the expression.  `constants` are derived constants that only this output needs.
     """
 
     name: str
@@ -130,4 +130,5 @@ class Output:
     per_ball: bool = False
     balls_of: str = ""
     over_balls: bool = False
+    parts: tuple[Output, ...] = ()
     constants: tuple[Definition, ...] = ()

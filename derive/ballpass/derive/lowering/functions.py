@@ -317,7 +317,8 @@ class _Lowering:
     def _moving(self, visit: Visitor, balls: Balls) -> Visitor:
         """A visitor that knows the sums over the balls, and the accelerations where anything uses them."""
         sums = self._sums(balls)
-        used = {symbol for o in self.system.outputs for symbol in o.expression.free_symbols}
+        every = [one for o in self.system.outputs for one in (o, *o.parts)]
+        used = {symbol for o in every for symbol in o.expression.free_symbols}
         if not self._late and used.isdisjoint(c.acceleration for c in self.system.coordinates):
             return visit.child(sums, {})
         found = accelerations(self.system, visit.child(sums, self._late)).value
@@ -340,7 +341,7 @@ class _Lowering:
 
         def value(output: Output) -> ca.SX:
             if not (output.per_ball or output.over_balls):
-                return visit(output.expression)
+                return reduce(add, (value(part) for part in output.parts), visit(output.expression))
             each = [ball(output.expression) for ball in balls[output.balls_of]]
             return ca.vertcat(*each) if output.per_ball else reduce(add, each)
 

@@ -32,7 +32,7 @@ MAX_NUMBERS = 2**29
 #: Outputs that a manifest does not know unless the scene names them.
 ON_REQUEST = (
     *("point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude", "*.power", "drive_power", "*.loss"),
-    *("*.energy", "cage.moment", "*.cage.moment"),
+    *("*.energy", "cage.moment", "*.cage.moment", "applied_power", "dissipated_power", "total_energy"),
     *("*kinetic_energy", "*ball.stiffness", "*ball.*_pressure", "*ball.*_axis", "*ball.*_approach"),
     *("*contact.stiffness.*", "*inner.a[xy]", "*outer.a[xy]"),
 )

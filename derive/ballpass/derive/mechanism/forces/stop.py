@@ -93,6 +93,10 @@ class Stop(Law):
         stored = sp.Piecewise((symbol_of(self.stiffness) * compression**2 / 2, compression > border.symbol), (0, True))
         words = f"Potential energy of the stop {name}"
         setting.requested.append(Output(name=f"{label}.energy", expression=stored, unit="J", description=words))
+        if self.hysteresis is not None:
+            elastic = sp.Piecewise((symbol_of(self.stiffness) * compression, compression > border.symbol), (0, True))
+            taken, words = (amount - elastic) * rate, f"Power loss by the hysteresis of the stop {name}"
+            setting.requested.append(Output(name=f"{label}.loss", expression=taken, unit="W", description=words))
         return -amount
 
     def words(self) -> str:
