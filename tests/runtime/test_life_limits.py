@@ -53,3 +53,14 @@ def test_a_bearing_within_all_limits_gets_no_word(make_model: Callable[..., Mode
     force = 7800.0 * math.pi / 6.0 * 7.9375e-3**3 * 16.75e-3 * (0.5 * (1.0 - 7.9375 / 33.5) * 4000.0) ** 2
     assert any(f"centrifugal force of a ball, {force:.3g} N" in words for words in fast)
     assert any("n d_m = 1.28e+06 mm/min exceeds 500000" in words for words in fast)
+
+
+def test_a_bearing_that_carries_nothing_lives_without_limit(make_model: Callable[..., Model]) -> None:
+    """A ring in free fall through a wide clearance: a reciprocal of zero ended in a traceback."""
+    model = make_model("varying_compliance", *XJTU)
+    report = model.life(cycles=0.02, transient=0, parameters={**CALM, "bearing.clearance": 30e-3})
+    (bearing,) = report.bearings
+    assert bearing.basic_life == math.inf
+    assert bearing.equivalent_load == 0.0
+    (words,) = report.beyond
+    assert "P = 0 N is 0 C_r: below 0.01 C_r, the minimum load" in words

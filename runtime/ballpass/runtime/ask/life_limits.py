@@ -54,7 +54,7 @@ def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStre
     # the outer ring stands: the cage turns at (1 - gamma)/2 of the speed
     centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * (0.5 * (1.0 - geometry.gamma) * speed) ** 2
     share = 5.0 * load / info.balls
-    if centrifugal > CENTRIFUGAL * share:
+    if centrifugal > CENTRIFUGAL * share > 0.0:  # without a load there is no life that it could shorten
         yield (
             f"the centrifugal force of a {noun}, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the heaviest "
             f"{noun}'s share of P, {share:.3g} N: the model's {noun}s have no mass, which holds to some "

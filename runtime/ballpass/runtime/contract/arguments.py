@@ -47,7 +47,7 @@ _EXAMPLES = {
 
 def type_fault(name: str, annotation: str, value: Any) -> str | None:
     """Why a value is none of what an annotation says; None where it is one, or the annotation is of another kind."""
-    kind = annotation.replace("collections.abc.", "")
+    kind = annotation.replace("collections.abc.", "").replace("pathlib.", "")
     optional = kind.removesuffix(" | None")
     expected = _EXPECTED.get(optional)
     if expected is None or (value is None and optional != kind) or _fits(expected, optional, value):
@@ -70,7 +70,9 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
 
 def is_number(value: object) -> bool:
     """Whether a value is one real number, also as NumPy has them."""
-    return (isinstance(value, Real) and not isinstance(value, bool)) or getattr(value, "shape", None) == ()
+    if getattr(value, "shape", None) == ():
+        value = value.item()  # type: ignore[attr-defined]
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def typed(function: _Function) -> _Function:

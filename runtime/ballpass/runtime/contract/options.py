@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
@@ -68,19 +69,26 @@ class Option:
         name : name of the option for the caller
         kind : its type
         """
-        wanted = type_fault(name, str(kind), value)
+        wanted = type_fault(name, kind.__name__ if isinstance(kind, type) else str(kind), value)
         if wanted is not None:
             return wanted
         if self.choices and value is not None:
-            wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
+            several = isinstance(value, Iterable) and not isinstance(value, str | bytes)
+            wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in self.choices]
             allowed, right = ", ".join(self.choices), not wrong
             given = "" if right else f"{wrong[0]!r:.60} is none of the choices"
         elif isinstance(value, int | float) and not isinstance(value, bool):
             kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
             allowed = self._allowed(kind)
+            value = math.copysign(math.inf, value > 0 or -1) if abs(value) > sys.float_info.max else value
             right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
             given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
-        elif kind in (float, int, float | None, int | None) and value is not None and not is_number(value):
+        elif kind is bool and not isinstance(value, bool):
+            allowed, right = "True, False", False
+            given = f"{value!r:.60} ({type(value).__name__}) is neither"
+        elif kind in (float, int, float | None, int | None) and not is_number(value):
+            if value is None and kind not in (float, int):
+                return None
             allowed, right = self._allowed("number"), False
             given = f"{value!r:.60} ({type(value).__name__}) is no number"
         else:

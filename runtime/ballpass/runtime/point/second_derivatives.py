@@ -49,7 +49,7 @@ def hessian(
     SimulationError
         The derivatives are not finite there.
     """
-    if isinstance(wrt, str) or len(wrt) != 2:
+    if not isinstance(wrt, tuple | list) or len(wrt) != 2:
         raise RequestError(f"hessian: wrt must be a pair of names, as ('inner.x', 'bearing.clearance'), not {wrt!r}.")
     time = checked_time(t)
     parts = rows_of(model, of)

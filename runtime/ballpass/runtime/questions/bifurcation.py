@@ -223,6 +223,7 @@ def bifurcation(
     if state not in names:
         raise RequestError(unknown_name("state", state, names))
     values = np.linspace(chosen.low, chosen.high, chosen.count)
+    model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
     step_of, every, forced = _strobe(model, {**overrides, chosen.name: chosen.low})
     tolerance = DEFAULT_RTOL if rtol is None else rtol

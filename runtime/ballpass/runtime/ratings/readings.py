@@ -72,7 +72,9 @@ def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[
 def lives(ratings: Ratings, powers: LoadPowers) -> dict[str, Any]:
     """Life by every reading [turns], infinite without a load."""
     balls = ratings.inner_ball, ratings.outer_ball
+    found = {}
     with np.errstate(divide="ignore"):
-        return {
-            n: reference_life(balls, loads, ratings.life) for n, loads in equivalent_loads(powers, ratings.life).items()
-        }
+        for name, (inner, outer) in equivalent_loads(powers, ratings.life).items():
+            # arrays: a number of Python's that is zero has no reciprocal
+            found[name] = reference_life(balls, (np.asarray(inner), np.asarray(outer)), ratings.life)
+    return found

@@ -18,7 +18,7 @@ from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import kinks_with_derivatives, refuse_jumps
-from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.request import Request, tolerance
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.short import ShortRepr
@@ -84,7 +84,7 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
     if not names:
         raise RequestError("sensitivities: no parameter was named. Give the names of one or more parameters.")
     made: list[Directions] = []
-    rtol = DERIVATIVE_RTOL if request.rtol is None else request.rtol
+    rtol = DERIVATIVE_RTOL if request.rtol is None else tolerance("rtol", request.rtol)
     own = min(SENSITIVITY * rtol, TOLERANCES[1]) if request.sensitivity_rtol is None else request.sensitivity_rtol
 
     def prepare(samples: int) -> Directions:
