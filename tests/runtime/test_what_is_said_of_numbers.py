@@ -27,6 +27,9 @@ COUNT = int(os.environ.get("BALLPASS_SAID", "3"))
 FACTOR, STARTS, MOVED = 10.0, 4, 1e-10
 TIGHT = MethodChoice(method="stepper-dop853", rtol=1e-10, kinks="located")
 
+#: Found by a campaign of 100: an rms a tenth of its extremes 1 % off in `run`, and in a sweep, without a warning.
+FOUND = (31, 97)
+
 _TANGENT = ('law = "tangent"', 'ratio = "0.25e-5 s"')
 _NONE = ('law = "none"', "")
 SCENES: tuple[tuple[str, tuple[str, str] | None], ...] = (
@@ -95,7 +98,10 @@ def wrong_numbers(model: Model, seed: int) -> list[str]:
             for which in (("min", "max") if kind == "range" else (kind,))
             if (which, item.channel) in growth.spread
         ]
-        said = DIGITS * size + 2.0 * sum(deviation for _, deviation in pairs)
+        # as the table prints it: twice the deviation, or the distance of the number from the mean
+        middle = sum(mean for mean, _ in pairs) if kind != "range" else pairs[1][0] - pairs[0][0] if pairs else 0.0
+        apart = abs(plain[item.name].value - middle) if pairs else 0.0
+        said = DIGITS * size + max(2.0 * sum(deviation for _, deviation in pairs), apart)
         if item.channel not in (*growth.uncertain, *growth.lost) and off[k] > FACTOR * DIGITS * size:
             wrong.append(f"{seed} run {item.name}: off by {off[k] / size:.2g}, without a warning")
         if pairs and off[k] > FACTOR * said:
@@ -131,6 +137,6 @@ def variant(make_model: Callable[..., Model], scene_text: Callable[..., str]) ->
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(COUNT))
+@pytest.mark.parametrize("seed", sorted({*range(COUNT), *FOUND}))
 def test_no_number_without_a_warning_is_far_off(variant: Callable[[int], Model], seed: int) -> None:
     assert wrong_numbers(variant(seed % len(SCENES)), seed) == []

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ballpass.runtime.certify.method_choice import MethodChoice, stepper_run
+from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult
@@ -44,13 +45,13 @@ TOLERATED = 100.0
 #: States that are apart by so much of their magnitudes at the end, from starts apart by a tolerance, have parted [1].
 PARTED = 1e-3
 
-#: Times that a number may be off by what four of its digits bear, where steps lose that over kinks: more is said [1].
+#: Times that a number may be off by what four of its digits bear, where steps lose that: more is said [1].
 LOST = 10.0
 
 #: Looser runs are compared at this tolerance: what their steps lose is their error, not a growth [1].
 LOOSEST = 1e-6
 
-#: Tolerance of a second look at what a large change of the start leaves, over that of the first [1].
+#: Tolerance of a second look at what a large change of the start leaves, or steps lose, over that of the first [1].
 TIGHTER = 1e-2
 
 #: Steps of that and of the first one, over those of a run [1].
@@ -64,6 +65,9 @@ STARTS = 20
 
 #: The same of each member of an ensemble whose states part.
 MEMBER_STARTS = 8
+
+#: Quantities that are a size of a motion themselves: their digits are of their own size.
+SIZES = ("rms", "std", "range")
 
 #: What is compared of each channel.
 KINDS = ("min", "max", "rms")
@@ -79,11 +83,11 @@ class Growth(ShortRepr):
     Attributes
     ----------
     moved : how far each position was moved at the start, in its magnitudes [1]
-    changes : largest change of minimum, maximum and rms of each channel, relative to the largest of them [1]
+    changes : largest change of each channel's extremes, relative to the larger, and of its rms, relative to itself [1]
     uncertain : channels whose digits the tolerance does not bear
     parted : how far the states are apart at the end of the run, in their magnitudes [1]
     steps : of the run
-    lost : of channels whose numbers steps over kinks put off by more than their digits: by how much [1]
+    lost : of channels whose numbers errors of the steps put off by more than their digits: by how much [1]
     spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
     """
 
@@ -106,9 +110,8 @@ class Growth(ShortRepr):
         if self.lost and not self.uncertain:
             worst = max(self.lost, key=lambda name: self.lost[name])
             return (
-                f"steps over the kinks of the laws put {', '.join(self.lost)} off, {worst} by "
-                f"{100.0 * self.lost[worst]:.2g} %: small errors grow in this motion for a while. Take a tighter "
-                "tolerance (--rtol 1e-8), or end steps on kinks (--kinks located)."
+                f"errors of the steps put {', '.join(self.lost)} off, {worst} by {100.0 * self.lost[worst]:.2g} %: in "
+                "this motion they grow, or add up, for a while. Take a tighter tolerance (--rtol 1e-8)."
             )
         if not self.uncertain and self.parted > PARTED:
             return (
@@ -148,11 +151,12 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
     found, plain = _compare(run, way, moved)
     if (found.uncertain or found.parted > PARTED) and way.kinks != LOCATED:
         way = replace(way, kinks=LOCATED)
-        found, located = _compare(run, way, moved)
-        off = {name: _relative(plain[name], located[name]) for name in found.changes if name not in found.uncertain}
-        # of looser runs it is not known
-        lost = {name: part for name, part in off.items() if part > LOST * DIGITS and run.rtol <= LOOSEST}
-        found = replace(found, lost=lost)
+        found, _ = _compare(run, way, moved)
+        if run.rtol <= LOOSEST:  # of looser runs it is not known
+            # where damping is light, what steps lose adds up, which no moved start shows
+            tight = _numbers(run, replace(way, rtol=max(TIGHTER * way.rtol, TOLERANCES[0])))
+            off = {name: _relative(plain[name], tight[name]) for name in found.changes if name not in found.uncertain}
+            found = replace(found, lost={name: part for name, part in off.items() if part > LOST * DIGITS})
     return _spread(run, way, found) if (found.uncertain or found.parted > PARTED) and spread else found
 
 
@@ -201,9 +205,7 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
 
 def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> tuple[Growth, dict[str, np.ndarray]]:
     """What a moved start changes, and the numbers of each channel from the start itself."""
-    channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
-    names = [f"{kind}:{name}" for name in channels for kind in KINDS]
-    quantities = QuantityRun(run.model, quantities_of(run.model, names))
+    channels, quantities = _channels(run)
 
     def integrate(start: float | np.ndarray, before: float) -> tuple[np.ndarray, np.ndarray, int]:
         tell = run.progress
@@ -216,25 +218,44 @@ def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> tuple[Growth, di
     tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
     changes, uncertain = {}, []
     for name, mine, its in zip(channels, one, other, strict=True):
-        largest, change = float(np.abs(mine).max()), float(np.abs(its - mine).max())
-        changes[name] = change / largest if largest > 0.0 else 0.0
-        if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
+        changes[name] = _relative(its, mine)
+        if np.any(np.abs(its - mine) > np.maximum(DIGITS * _sizes(mine), tolerated.get(name, 0.0))):
             uncertain.append(name)
     parted = float(np.max(np.abs(other_end - end) / run.magnitude))
     found = Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain), parted=parted, steps=steps)
     return found, dict(zip(channels, one, strict=True))
 
 
+def _channels(run: Run) -> tuple[list[str], QuantityRun]:
+    """What is compared."""
+    channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
+    names = [f"{kind}:{name}" for name in channels for kind in KINDS]
+    return channels, QuantityRun(run.model, quantities_of(run.model, names))
+
+
+def _numbers(run: Run, way: MethodChoice) -> dict[str, np.ndarray]:
+    """The numbers of each channel."""
+    channels, quantities = _channels(run)
+    found = way.measure(quantities, replace(run, progress=None), 0.0).values
+    return dict(zip(channels, found.reshape(-1, len(KINDS)), strict=True))
+
+
+def _sizes(numbers: np.ndarray) -> np.ndarray:
+    """What changes of a channel's numbers are measured by: an extreme may cross zero, an rms is printed by itself."""
+    size = np.abs(numbers)
+    return np.asarray(np.where(np.array(KINDS) == "rms", size, np.max(size, axis=-1, keepdims=True)))
+
+
 def _relative(numbers: np.ndarray, others: np.ndarray) -> float:
-    """Largest difference over the largest number."""
-    largest = float(np.abs(others).max())
-    return float(np.abs(numbers - others).max()) / largest if largest > 0.0 else 0.0
+    """Largest difference over the size of the number [1]."""
+    sizes = _sizes(others)
+    return float(np.max(np.abs(numbers - others)[sizes > 0.0] / sizes[sizes > 0.0], initial=0.0))
 
 
 def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
     """The same, with which numbers are uncertain and how much by more starts, moved by one tolerance, two, ..."""
-    names = [(kind, channel) for channel in found.changes for kind in KINDS]
-    quantities = QuantityRun(run.model, quantities_of(run.model, [f"{kind}:{channel}" for kind, channel in names]))
+    channels, quantities = _channels(run)
+    names = [(kind, channel) for channel in channels for kind in KINDS]
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
     every = []
     for k in range(STARTS):
@@ -243,12 +264,10 @@ def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
             run.progress((k + 1) / STARTS)
     mean, deviation = np.mean(every, axis=0), np.std(every, axis=0, ddof=1)
     # twice the deviation is what is printed behind +-
-    channels = list(found.changes)
-    largest = np.max(np.abs(mean).reshape(-1, len(KINDS)), axis=1)
-    apart = 2.0 * np.max(deviation.reshape(-1, len(KINDS)), axis=1)
     changes = dict(found.changes)
-    for name, size, change in zip(channels, largest.tolist(), apart.tolist(), strict=True):
-        changes[name] = max(changes[name], change / size if size > 0.0 else 0.0)
+    table = zip(channels, mean.reshape(-1, len(KINDS)), deviation.reshape(-1, len(KINDS)), strict=True)
+    for name, middle, apart in table:
+        changes[name] = max(changes[name], _relative(middle + 2.0 * apart, middle))
     uncertain = tuple(name for name in channels if name in found.uncertain or changes[name] > DIGITS)
     spread = dict(zip(names, zip(mean.tolist(), deviation.tolist(), strict=True), strict=True))
     kept = {key: value for key, value in spread.items() if key[1] in uncertain}
@@ -336,6 +355,6 @@ def _at_rest(quantity: Quantity) -> bool:
 
 
 def _has_range(model: LoadedModel, quantity: Quantity) -> bool:
-    """Whether a quantity is in the unit of its channel, so that it compares with the channel's range."""
+    """Whether a quantity is in the unit of its channel and may cross zero, so that the channel's range is its size."""
     columns = channels_of(model.manifest)
-    return quantity.channel in columns and columns[quantity.channel][1] == quantity.unit
+    return quantity.kind not in SIZES and quantity.channel in columns and columns[quantity.channel][1] == quantity.unit
