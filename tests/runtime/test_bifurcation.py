@@ -63,11 +63,11 @@ def test_the_exponent_of_the_papers_press_is_that_of_the_multiplier_of_134_turns
     make_model: Callable[..., Model],
 ) -> None:
     found = make_model("punching_press_tangent").bifurcation(
-        "bearing.clearance=19.9 um:20 um:2", readings=134, settling=20, rtol=1e-10
+        "bearing.clearance=19.9 um:20 um:2", readings=134, settling=20
     )
     motion = found.up[-1]
     assert motion.exponent is not None
-    assert motion.exponent.mean == pytest.approx(-1.7588, abs=2e-3)
+    assert motion.exponent.mean == pytest.approx(-1.7588, abs=2e-3)  # at 1e-7 it is -1.7506
     assert motion.kind == "quasi-periodic"
     assert "balls are elsewhere" in found.every
 
