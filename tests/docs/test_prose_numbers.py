@@ -68,7 +68,7 @@ NAMED: dict[str, dict[str, str]] = {
         "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of ask/lyapunov.py",
         "repeat after n, up to 16.": "`LONGEST` of ask/lyapunov.py",
         "ratio 409/1072) repeats after 134 turns only": "(1 - 7.9375/33.5)/2; test_steady.py",
-        "as in Fig. 7 of the paper": "the paper's figure",
+        "In Fig. 7 of the paper": "the paper's figure",
     },
     "docs/howto/steady.md": {
         "cage ratio of 409/1072, and repeats after 134 turns": "(1 - 7.9375/33.5)/2; test_steady.py",

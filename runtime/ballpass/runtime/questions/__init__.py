@@ -12,6 +12,7 @@ from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
 from ballpass.runtime.questions.optimize import optimize
+from ballpass.runtime.questions.section import section
 from ballpass.runtime.questions.sensitivity import sensitivity
 from ballpass.runtime.questions.sobol import sobol
 from ballpass.runtime.questions.spectrum import spectrum
@@ -27,6 +28,7 @@ class Questions:
     life = life
     linearize = linearize
     optimize = optimize
+    section = section
     sensitivity = sensitivity
     sobol = sobol
     spectrum = spectrum

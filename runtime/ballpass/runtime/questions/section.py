@@ -1,0 +1,236 @@
+"""A Poincaré section of a long run: states once a turn, and the closed curve on which they lie where there is one.
+
+Where drive and cage have no common period, no state repeats.  In a motion that attracts, the state at one angle of the
+driver is then a function of where the balls stand: a closed curve, which is fitted by a Fourier series.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.options import Option, Rtol
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.questions.bifurcation import State
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.invariant_curve import InvariantCurve
+
+#: Tolerance where none is given [1].
+DEFAULT_RTOL = 1e-7
+
+#: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
+#: press at a loaded angle comes as near as 0.08 [1].
+ON_CURVE = 0.02
+
+Section = Annotated[int, Option(words="Turns of which a point is kept.", shown="N", least=40, most=1_000_000)]
+Dropped = Annotated[int, Option(words="Turns at the start that do not count.", shown="N", least=0, most=1_000_000)]
+At = Annotated[
+    float, Option(words="Angle that driver or shaft has turned since t = 0 at each point.", shown="DEG", unit="deg")
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PoincareSection(ShortRepr, Reported):
+    """States of a long run, once a turn.
+
+    Attributes
+    ----------
+    names, units : of the states
+    row : of the state that is shown
+    angle : of driver or shaft since t = 0 [deg]
+    states : points, shape (readings, states)
+    phase : where the balls stand at each point, in ball pitches from 0 to 1, shape (readings,) [1]
+    period : turns after which points repeat; 0 where they do not
+    curve : fitted over `phase`; None where points repeat, or where several cages turn
+
+    Examples
+    --------
+    >>> found = model.section(readings=100, settling=20, at=270.0)
+    >>> found.states.shape, found.kind
+    ((100, 8), 'on a closed curve')
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    row: int
+    angle: float
+    states: np.ndarray
+    phase: np.ndarray
+    period: int
+    curve: InvariantCurve | None
+
+    @property
+    def kind(self) -> str:
+        """What the points are.
+
+        Examples
+        --------
+        >>> model.section(readings=40, parameters={"bearing.pitch_diameter": 31.75e-3}).kind
+        'repeats after 1 turn'
+        """
+        if self.period:
+            return f"repeats after {self.period} turn{'' if self.period == 1 else 's'}"
+        if self.curve is None:
+            return "not named: several cages turn"
+        return "on a closed curve" if np.max(self.curve.missed) <= ON_CURVE else "on no smooth curve"
+
+    def _report(self) -> Report:
+        missed = self.curve.missed if self.curve is not None else np.full(len(self.names), math.nan)
+        records = [
+            {
+                "state": name,
+                "unit": unit,
+                "least": float(column.min()),
+                "largest": float(column.max()),
+                "missed": float(share) if math.isfinite(share) else None,
+            }
+            for name, unit, column, share in zip(self.names, self.units, self.states.T, missed, strict=True)
+        ]
+        fitted = self.curve is not None
+        table = ReportTable(
+            title=f"{len(self.states)} points, one a turn, at {self.angle:g} deg: {self.kind}",
+            heads=("state", "least", "largest", "unit", *(("distance from the curve",) if fitted else ())),
+            rows=[
+                (
+                    str(one["state"]),
+                    f"{one['least']:.6g}",
+                    f"{one['largest']:.6g}",
+                    str(one["unit"]),
+                    *((f"{100.0 * share:.2g} %",) if fitted else ()),
+                )
+                for one, share in zip(records, missed.tolist(), strict=True)
+            ],
+            right=("least", "largest", "distance from the curve")[: 3 if fitted else 2],
+        )
+        parts: list[str | ReportTable] = [table]
+        if self.curve is not None:
+            drift = self.curve.drift
+            around = f", so that they go round once in {1.0 / abs(drift):.4g} turns" if drift else ""
+            parts.append(
+                f"From turn to turn the balls move by {drift:.6g} of a ball pitch beyond whole pitches{around}. The "
+                f"curve has {self.curve.harmonics} harmonics, fitted to every second point; distances are those of "
+                "the others, in shares of the points' spread."
+            )
+        if self.kind == "on a closed curve":
+            parts.append(
+                f"Within {100.0 * ON_CURVE:g} % the state follows the balls: quasi-periodic. Few points of such a "
+                "curve look like separate parts."
+            )
+        elif self.kind == "on no smooth curve":
+            parts.append(
+                "The motion is chaotic, not settled, or its curve is finer than these points resolve. Take more points "
+                "or another angle (at); the Lyapunov exponent of ballpass bifurcation says whether it is chaotic."
+            )
+        facts = {
+            "angle": self.angle,
+            "kind": self.kind,
+            "period": self.period,
+            "drift": self.curve.drift if self.curve is not None else None,
+            "harmonics": self.curve.harmonics if self.curve is not None else None,
+            "states": records,
+            "phase": self.phase.tolist(),
+            "points": self.states.tolist(),
+        }
+        return Report(parts=parts, facts=facts, records=records, index=("state",))
+
+
+def _figures(_model: AnyModel, found: PoincareSection, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.section import draw_section
+
+    curve = found.curve if found.kind == "on a closed curve" else None
+    words = f"{len(found.states)} points, one a turn, {found.angle:g} degrees after t = 0: {found.kind}."
+    yield "section", draw_section(found.states, found.phase, found.names, found.units, found.row, curve, words)
+
+
+@Question(stage="simulate", figures=_figures)
+def section(
+    model: AnyModel,
+    of: State = None,
+    *,
+    readings: Section = 400,
+    settling: Dropped = 50,
+    at: At = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    rtol: Rtol = None,
+    progress: Progress = None,
+) -> PoincareSection:
+    """Take the Poincaré section of a long run, and fit the closed curve on which its points lie.
+
+    A state is read once a turn, always at the same angle. Points that repeat belong to a periodic motion, points on a
+    closed curve to a quasi-periodic one. The curve is a Fourier series over the place of the balls; every second point
+    is left out of the fit and judges it.
+
+    Parameters
+    ----------
+    parameters : overrides, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        An unknown state, a scene without states, one in which nothing turns, or one whose driver's motion is a state.
+    IntegrationError
+        The computation failed.
+
+    Examples
+    --------
+    >>> found = model.section("inner.x", readings=100, settling=20, at=270.0)
+    >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
+    True
+    """
+    from ballpass.runtime.ask.invariant_curve import fit_curve
+    from ballpass.runtime.ask.lyapunov import period_of
+    from ballpass.runtime.run.ball_angles import ball_angles
+
+    manifest = model.manifest
+    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
+        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
+        raise RequestError(f"section: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
+    turn = model.period(parameters or {})
+    if not math.isfinite(turn):
+        raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
+    names = tuple(info.name for info in manifest.states)
+    state = of or ("inner.y" if "inner.y" in names else names[0])
+    if state not in names:
+        raise RequestError(unknown_name("state", state, names))
+    times = turn * (settling + at / 360.0 + np.arange(1, readings + 1))
+    with shown("taking points", progress):
+        run = model.simulate(
+            duration=float(times[-1]),
+            times=times,
+            parameters=parameters,
+            rtol=DEFAULT_RTOL if rtol is None else rtol,
+            outputs=[],
+            transient=0.0,
+            progress=False,
+        )
+    period = period_of(run.x, np.array(run.statistics.magnitudes))
+    numbers, phase, curve = model.numbers(parameters or {}), np.zeros(readings), None
+    if len(manifest.bearings) == 1:
+        first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(run.t.tolist(), run.x, strict=True)]
+        pitches = np.array(first) * manifest.bearings[0].balls / math.tau
+        phase = pitches % 1.0
+        curve = None if period else fit_curve(pitches, run.x)
+    return PoincareSection(
+        names=names,
+        units=tuple(info.unit for info in manifest.states),
+        row=names.index(state),
+        angle=at,
+        states=run.x,
+        phase=phase,
+        period=period,
+        curve=curve,
+    )

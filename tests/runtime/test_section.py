@@ -1,0 +1,67 @@
+"""Poincaré sections: curves that are known, points that repeat, a curve that predicts another run, refusals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.ask.invariant_curve import fit_curve
+from ballpass.runtime.questions.section import ON_CURVE
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> Model:
+    return make_model("punching_press_tangent")
+
+
+def test_a_curve_that_is_known_is_found_and_noise_is_none() -> None:
+    phase = np.arange(300) * (math.sqrt(5.0) - 1.0) / 2.0
+    angle = 2.0 * np.pi * phase
+    points = np.column_stack([np.exp(np.sin(angle)), np.cos(3.0 * angle) + 0.2 * np.sin(5.0 * angle)])
+    curve = fit_curve(phase, points)
+    other = np.array([0.123, 0.77])
+    assert curve(other)[:, 0] == pytest.approx(np.exp(np.sin(2.0 * np.pi * other)), abs=1e-6)
+    assert np.max(curve.missed) < 1e-6
+    assert curve.drift == pytest.approx((math.sqrt(5.0) - 1.0) / 2.0 - 1.0, abs=1e-12)
+    noise = np.random.default_rng(2).normal(size=(300, 1))
+    assert fit_curve(phase, noise).missed[0] > 0.9
+
+
+def test_at_bottom_dead_centre_the_press_of_the_paper_lies_on_a_curve_that_another_run_meets(press: Model) -> None:
+    found = press.section(at=270.0, readings=200, settling=30)
+    assert found.kind == "on a closed curve"
+    assert found.curve is not None
+    # balls that pass the outer ring in a turn: 8 times 409/1072
+    assert found.curve.drift == pytest.approx(8.0 * 409.0 / 1072.0 - 3.0, abs=1e-9)
+    start = np.array([0.0, -5e-6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    times = press.period() * (np.arange(40, 60) + 0.75)
+    run = press.simulate(duration=float(times[-1]), times=times, initial=start, outputs=[], transient=0.0)
+    met = found.curve((np.arange(40, 60) + 0.75) * 8.0 * 409.0 / 1072.0)
+    assert np.max(np.sqrt(np.mean((met - run.x) ** 2, axis=0)) / found.states.std(axis=0)) < 2.0 * ON_CURVE
+    assert "19.14 turns" in str(found)
+
+
+def test_points_of_a_press_whose_turn_is_a_period_repeat(press: Model) -> None:
+    found = press.section(parameters={"bearing.pitch_diameter": 31.75e-3}, readings=40)
+    assert found.kind == "repeats after 1 turn"
+    assert found.curve is None
+    assert "repeats after 1 turn" in str(found)
+
+
+@pytest.mark.long
+def test_chaotic_points_are_on_no_curve_at_any_load(press: Model) -> None:
+    for angle in (0.0, 270.0):
+        found = press.section(at=angle, readings=200, parameters={"bearing.clearance": 40e-6})
+        assert found.kind == "on no smooth curve"
+        assert "Lyapunov" in str(found)
+
+
+def test_what_has_no_section_is_refused(press: Model, make_model: Callable[..., Model]) -> None:
+    with pytest.raises(RequestError, match=r"inner\.y"):
+        press.section("inner.z")
+    with pytest.raises(RequestError, match="driver's motion is a state"):
+        make_model("punching_press_motor").section()
