@@ -95,6 +95,8 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         const double theta = part + span * ((double)q / (BP_POINTS - 1));
         double *restrict y = b->sampled[q];
         if (theta >= 1.0) memcpy(y, b->next, sizeof b->next);
+        /* the method of most runs once more, as its step: its coefficients are constants */
+        else if (b->method == BP_AUTO_LOW) bp_lane_explicit_at(bp_methods[BP_AUTO_LOW].plain, dense, b->x, b->next, theta, y);
         else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
         else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
@@ -163,7 +165,9 @@ static void reduce(const bp_job *job, bp_lane_block *b)
     const int parts = bp_parts(method->dense_degree);
     double add[BP_L] BP_ALIGNED;
     BP_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
-    if (method->plain) {
+    if (b->method == BP_AUTO_LOW && bp_methods[BP_AUTO_LOW].plain->dense_stages == 0) {
+        bp_lane_explicit_dense(bp_methods[BP_AUTO_LOW].plain, NULL, b->plain.k, b->x, b->h, b->next, b->dense);
+    } else if (method->plain) {
         bp_lane_times at;
         bp_lane_times_of(&at, &b->numbers, &b->angles, method->plain->dense_nodes, method->plain->dense_stages, b->t, b->h);
         bp_lane_explicit_dense(method->plain, &at, b->plain.k, b->x, b->h, b->next, b->dense);

@@ -157,6 +157,9 @@ static double try_step(bp_run *run, double t, double h)
     if (plain) {
         run->result->evaluations += plain->stages;
         /* even steps once more: without a pace that no other step has */
+        /* the method of most runs once more, so that its coefficients are constants */
+        if (run->method == BP_AUTO_LOW && !is_paced(run))
+            return bp_explicit_step(bp_methods[BP_AUTO_LOW].plain, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
         if (is_paced(run)) return bp_explicit_step(plain, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
         return bp_explicit_step(plain, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
     }
