@@ -84,6 +84,19 @@ ANSWERS = {
         ),
         "sobol",
     ),
+    "morris_press": (
+        (
+            *("morris", "punching_press_tangent.toml", "--of", "peak_ball_force"),
+            *("--vary", "bearing.clearance=5 um:20 um", "--vary", "bearing.damping.ratio=2 us:3 us"),
+            *("--vary", "mechanism.bodies.slider.mass=16 kg:17.5 kg", "--vary", "bearing.share=0.45:0.55"),
+            *("--vary", "mechanism.bodies.rod.mass=2.4 kg:2.7 kg", "--vary", "bearing.outer_ring.mass=0.5 kg:0.6 kg"),
+            *("--vary", "bearing.outer_ring.stiffness=30 MN/m:70 MN/m"),
+            *("--vary", "bearing.outer_ring.damping=300 N*s/m:700 N*s/m"),
+            *("--vary", "bearing.contact.young_modulus=200 GPa:214 GPa"),
+            *("--vary", "bearing.pitch_diameter=33.49 mm:33.51 mm"),
+        ),
+        "morris",
+    ),
 }
 
 #: Keys of the press's bearing that a designation gives.

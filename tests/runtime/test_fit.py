@@ -154,6 +154,56 @@ def test_accelerations_are_data_too(make_model: Callable[..., Model]) -> None:
     assert abs(found.numbers[0].value - 7e-6) < 3.0 * found.numbers[0].deviation < 1e-6
 
 
+def test_a_spectrum_is_data_as_amplitudes_over_the_frequency(make_model: Callable[..., Model], tmp_path: Path) -> None:
+    """Amplitudes of a discrete Fourier transform, by a second method, over whole turns; gain of the sensor unknown."""
+    rotor, turns, count = make_model("rotor"), 8, 4096
+    truth = {CLEARANCE: 7e-6, "loads.unbalance.mass": 4e-3}
+    turn = 2.0 * np.pi / {one.name: one.default for one in rotor.manifest.parameters}["shaft.speed"]
+    times = turn * (2.0 + turns * np.arange(count) / count)
+    y = rotor.simulate(times=times, parameters=truth, rtol=1e-10, progress=False)["inner.y"]
+    lines = 2.0 * np.abs(np.fft.rfft(y))[1:61] / count
+    noise = 0.01 * np.std(lines) * np.random.default_rng(1).standard_normal(60)
+    frequency = np.arange(1, 61) / (turns * turn)
+    path = tmp_path / "spectrum.csv"
+    rows = [f"{f / 1e3!r},{1e6 * a!r}" for f, a in zip(frequency.tolist(), (1.2 * lines + noise).tolist(), strict=True)]
+    path.write_text("\n".join(["frequency [kHz],inner.y [um]", *rows]))
+    vary = [f"{CLEARANCE}=2 um:15 um", "loads.unbalance.mass=1 g:20 g:log"]
+    found = rotor.fit(path, vary, cycles=2 + turns, transient=2, gain=True, progress=False)
+    for one, value in zip(found.numbers, (*truth.values(), 1.2), strict=True):
+        assert abs(one.value - value) < 3.0 * one.deviation < 0.2 * value, one
+    assert found.signals[0].noise == pytest.approx(np.std(noise), rel=0.3)
+    assert found.signals[0].axis == "frequency"
+
+
+def test_lines_peaks_and_means_are_data_with_their_deviations(make_model: Callable[..., Model], tmp_path: Path) -> None:
+    """Four numbers read off instruments at each of two speeds, in a table with units."""
+    rotor, names = make_model("rotor"), ["amplitude:inner.y@1x", "amplitude:inner.x@1x", "rms:inner.y", "mean:inner.y"]
+    truth = {CLEARANCE: 7e-6, "loads.unbalance.mass": 4e-3}
+    length: dict[str, float] = {"cycles": 6, "transient": 3}
+    random, paths = np.random.default_rng(4), []
+    for speed in (250.0, 350.0):
+        at = rotor.quantities(names, parameters=truth | {"shaft.speed": speed}, rtol=1e-9, **length)
+        rows = []
+        for name in names:
+            one = at[name]
+            deviation = 0.01 * abs(one.value)
+            value = one.value + deviation * random.standard_normal()
+            rows.append(f"{name},{float(value)!r} {one.unit},{float(deviation)!r} {one.unit}")
+        paths.append(tmp_path / f"{speed}.csv")
+        paths[-1].write_text("\n".join([f"# shaft.speed = {speed} rad/s", "quantity,value,deviation", *rows]))
+    vary = [f"{CLEARANCE}=2 um:15 um", "loads.unbalance.mass=1 g:20 g:log"]
+    found = rotor.fit(paths, vary, progress=False, **length)
+    for one, value in zip(found.numbers, truth.values(), strict=True):
+        assert one.low < value < one.high, one
+        assert one.deviation < 0.1 * value
+    assert 0.3 < found.signals[0].noise == found.signals[1].noise < 2.0
+    assert not found.report().warnings
+    far = rotor.fit(paths, f"{CLEARANCE}=2 um:5 um", progress=False, starts=1, **length)
+    assert "differs by" in far.report().warnings[0]
+    with pytest.raises(RequestError, match="1 values for 2 numbers"):
+        rotor.fit({"rms:inner.y": 1e-6}, vary, progress=False, **length)
+
+
 def test_filtered_noise_is_warned_of(press: Model) -> None:
     data = _data(press, {CLEARANCE: 13.7e-6}, "outer.y", 0.0, 1, np.arange(500) / 5e3)
     random = np.convolve(np.random.default_rng(1).standard_normal(502), np.ones(3), "valid")
@@ -181,6 +231,8 @@ def test_a_chaotic_motion_is_refused(press: Model) -> None:
         ({"time": np.arange(9.0), "outer.y": np.arange(9.0)}, {"shift": "1 ms"}, "no range of times"),
         ({"time": np.arange(9.0), "outer.y": np.arange(9.0)}, {"loss": "square"}, "huber"),
         ("nowhere.csv", {}, "cannot be read"),
+        ({"peak_ball_force": 0.0}, {}, "a value above zero"),
+        ({"frequency": np.arange(9.0), "outer.y": np.arange(9.0)}, {}, "above 0 Hz"),
     ],
 )
 def test_wrong_requests_are_refused(press: Model, data: object, options: dict[str, str], words: str) -> None:

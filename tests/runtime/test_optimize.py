@@ -99,6 +99,48 @@ def test_two_parameters_with_an_active_limit_against_a_fine_sweep(make_model: Ca
     assert found.value < within.min() < 1.02 * found.value
 
 
+def test_the_worst_within_a_tolerance_that_acts_one_way_is_at_its_end(make_model: Callable[..., Model]) -> None:
+    """The motion grows with the clearance: least at 5 um, where the worst is that of 7 um."""
+    press = make_model("punching_press")
+    options = {"cycles": 3, "starts": 1, "tolerance": "bearing.clearance=-1 um:2 um"}
+    found = press.optimize("rms:inner.y", "bearing.clearance=5 um:15 um", **options)
+    at = QuantityFunction(press, "rms:inner.y", ["bearing.clearance"], cycles=3)([[5e-6], [7e-6]])
+    assert found.bounds == ("first",)
+    assert found.worst == pytest.approx([2e-6])
+    assert found.value == pytest.approx(at[1], rel=1e-5)
+    assert found.nominal == pytest.approx(at[0], rel=1e-5)
+    assert found.nominal < found.further < found.value
+    assert not found.report().warnings
+
+
+@pytest.mark.long
+def test_the_least_worst_peak_over_a_box_against_a_fine_sweep(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press")
+    damping, clearance, stiffness = "bearing.outer_ring.damping", "bearing.clearance", "bearing.outer_ring.stiffness"
+    found = press.optimize(
+        "peak_ball_force",
+        f"{damping}=1000 N*s/m:10000 N*s/m:log",
+        cycles=4,
+        transient=2,
+        tolerance=[f"{clearance}=-2 um:2 um", f"{stiffness}=-5 MN/m:5 MN/m"],
+        starts=1,
+    )
+    value = {info.name: info.default for info in press.manifest.parameters}
+    dampings = np.geomspace(2e3, 5e3, 41)
+    grid = np.meshgrid(
+        dampings,
+        value[clearance] + np.linspace(-2e-6, 2e-6, 7),
+        value[stiffness] + np.linspace(-5e6, 5e6, 7),
+        indexing="ij",
+    )
+    table = dict(zip((damping, clearance, stiffness), (one.ravel() for one in grid), strict=True))
+    swept = press.simulate_many(table, "peak_ball_force", cycles=4, transient=2)["peak_ball_force"]
+    worst = swept.reshape(41, -1).max(axis=1)
+    assert found.value < worst.min() < 1.005 * found.value
+    assert found.x[0] == pytest.approx(dampings[np.argmin(worst)], rel=0.03)
+    assert found.nominal < found.value
+
+
 @pytest.mark.parametrize(
     ("vary", "limit", "words"),
     [

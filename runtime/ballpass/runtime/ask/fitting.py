@@ -2,8 +2,9 @@
 
 In: a `Misfit` and a start.  Out: a `Fitted`.
 
-Noise is white and of one size in each signal; that size is found with the unknowns.  Deviations are those of the
-linearized problem, for a robust loss with the factor of M-estimators (Huber 1981).
+Noise is white and of one size in each signal, and in all quantities over their deviations; that size is found with the
+unknowns.  Deviations are those of the linearized problem, for a robust loss with the factor of M-estimators (Huber
+1981).
 """
 
 from __future__ import annotations
@@ -179,7 +180,7 @@ def best_of(misfit: Misfit, candidates: np.ndarray) -> np.ndarray:
     """
     linear = misfit.linear
     ranged = [k for k in range(len(misfit.unknowns)) if k not in linear]
-    weighted = _Weighted(misfit, np.array([np.std(record.values) for record in misfit.records]))
+    weighted = _Weighted(misfit, np.array([record.noise for record in misfit.records]))
     best, least = None, np.inf
     for shares in candidates:
         counts = np.zeros(len(misfit.unknowns))
@@ -211,7 +212,7 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
     """
     from scipy.stats import t as student
 
-    noise = np.array([np.std(record.values) for record in misfit.records])
+    noise = np.array([record.noise for record in misfit.records])
     counts, evaluations = start, 0
     samples = sum(len(record.values) for record in misfit.records)
     for weighing in range(WEIGHINGS):
@@ -222,6 +223,10 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
         ends = np.cumsum([len(record.values) for record in misfit.records])[:-1]
         parts = [size * part for size, part in zip(noise, np.split(whole, ends), strict=True)]
         found = np.array([_size(part, loss) for part in parts])
+        # quantities are few in a trial, and have deviations or values to be counted in: of one size in all trials
+        few = [k for k, record in enumerate(misfit.records) if record.axis == "quantity"]
+        if few:
+            found[few] = _size(np.concatenate([parts[k] for k in few]), loss)
         done = np.all(np.abs(found / noise - 1.0) < SAME_NOISE) or (loss == "linear" and len(parts) == 1)
         if progress is not None:
             progress((weighing + 1) / WEIGHINGS)

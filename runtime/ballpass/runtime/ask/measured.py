@@ -3,9 +3,10 @@
 In: a path or a mapping, a manifest, names of columns by output.  Out: a `Trial`, SI.
 
 A CSV file's first line names its columns, with a unit in brackets where it is not SI: ``time [ms],outer.y [um]``.  The
-first column is the time.  A line ``# PATH = VALUE`` says a number of the scene in this trial alone; other lines that
-begin with ``#`` are left out.  A NetCDF file has a variable ``time``, units in attributes, and numbers of the trial in
-attributes of its own.
+first column is the time.  Where it is ``frequency [Hz]`` the others are amplitudes of outputs.  Where it is
+``quantity``, rows name quantities: ``quantity,value,deviation`` with units in the cells.  A line ``# PATH = VALUE``
+says a number of the scene in this trial alone; other lines that begin with ``#`` are left out.  A NetCDF file has a
+variable ``time`` or ``frequency``, units in attributes, and numbers of the trial in attributes of its own.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
 
 #: Largest CSV file [bytes].
 LARGEST = 500_000_000
 
-#: Fewest samples of a signal.
-FEWEST = 8
+#: Fewest samples of a signal; most lines of a spectrum.
+FEWEST, MOST_LINES = 8, 2000
 
 #: Measured signals as callers give them.
 Source = str | Path | Mapping[str, Any]
@@ -44,12 +46,36 @@ class Trial:
     t : times of the samples as they were recorded, shape (samples,) [s]
     signals : by output, NaN for what is missing, each of shape (samples,) [output's unit]
     parameters : numbers of the scene in this trial alone, SI
+    quantities : what was measured instead of signals
     """
 
     name: str
     t: np.ndarray
     signals: Mapping[str, np.ndarray]
     parameters: Mapping[str, float]
+    quantities: tuple[MeasuredQuantities, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredQuantities:
+    """Quantities of one run: amplitudes of a spectrum, or any others.
+
+    Attributes
+    ----------
+    name : for people
+    names : of the quantities
+    unit : of a spectrum; empty where each has its own
+    frequencies : of a spectrum, shape (quantities,), empty for others [Hz]
+    values : SI, of the same shape
+    sizes : in which noise is counted, of the same shape: 1 in a spectrum, else deviations as given, or the values
+    """
+
+    name: str
+    names: tuple[str, ...]
+    unit: str
+    frequencies: np.ndarray
+    values: np.ndarray
+    sizes: np.ndarray
 
 
 def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], number: int) -> Trial:
@@ -66,23 +92,58 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
     RequestError
         No such file or column, another format, times that do not increase, or too few samples.
     """
-    numbers: dict[str, float] = {}
+    infos = {info.name: info for info in manifest.parameters}
     if isinstance(source, str | Path):
         name = Path(source).name
         table, said = _netcdf(source) if name.endswith(".nc") else _csv(source)
-        infos = {info.name: info for info in manifest.parameters}
-        for key, text in said.items():
-            if key in infos:
-                numbers[key] = _quantity(f"{name}, {key}", text, infos[key].unit)
+        numbers = {
+            key: _quantity(f"{name}, {key}", text, infos[key].unit) for key, text in said.items() if key in infos
+        }
     else:
-        name, table = f"trial {number}", {}
-        known = {info.name for info in manifest.parameters}
-        for key in source:
-            if key in known:
-                numbers[key] = float(source[key])
-            else:
-                table[str(key)] = (np.asarray(source[key], dtype=float), "")
-    return _trial(manifest, name, table, columns, numbers)
+        name = f"trial {number}"
+        numbers = {key: float(source[key]) for key in source if key in infos}
+        table = {str(key): (source[key], "") for key in source if key not in infos}
+        if "time" not in table and table and all(np.size(value) <= 2 for value, _ in table.values()):
+            pairs = {key: np.atleast_1d(np.asarray(value, dtype=float)) for key, (value, _) in table.items()}
+            rows = [(key, *(f"{number!r}" for number in pair.tolist())) for key, pair in pairs.items()]
+            table = {"quantity": (rows, "")}
+    if "quantity" in table:
+        given = (_quantities(manifest, name, table["quantity"][0]),)
+        return Trial(name=name, t=np.zeros(0), signals={}, parameters=numbers, quantities=given)
+    arrays = {key: (np.asarray(values, dtype=float), unit) for key, (values, unit) in table.items()}
+    return _trial(manifest, name, arrays, columns, numbers)
+
+
+def _quantities(manifest: Manifest, name: str, rows: Sequence[Sequence[str]]) -> MeasuredQuantities:
+    """Quantities from rows of name, value and deviation; numbers without a unit are SI."""
+    names, values, sizes = [], [], []
+    for cells in rows:
+        if not 2 <= len(cells) <= 3:
+            raise RequestError(f"{name}: {','.join(cells)!r:.80} is no row of it. Allowed: quantity,value[,deviation].")
+        unit = parse_quantity_name(manifest, cells[0].strip()).unit
+        value, size = (_with_unit(f"{name}, {cells[0]}", cell, unit) for cell in (cells[1], cells[-1]))
+        if not (np.isfinite(value) and np.isfinite(size) and size != 0.0):
+            raise RequestError(f"{name}, {cells[0]}: a value above zero is expected, or a deviation beside it.")
+        names.append(cells[0].strip())
+        values.append(value)
+        sizes.append(abs(size))
+    if len(set(names)) < len(names):
+        raise RequestError(f"{name}: a quantity is there twice. Give each once, with the mean of its values.")
+    return MeasuredQuantities(
+        name=f"quantities of {name}",
+        names=tuple(names),
+        unit="",
+        frequencies=np.zeros(0),
+        values=np.array(values),
+        sizes=np.array(sizes),
+    )
+
+
+def _with_unit(what: str, text: str, unit: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return _quantity(what, text, unit)
 
 
 def _trial(
@@ -96,8 +157,9 @@ def _trial(
     chosen = dict(columns) or {key: key for key in table if key in infos}
     faults = [unknown_name("output or state with one value", key, infos) for key in chosen if key not in infos]
     faults += [unknown_name(f"column of {name}", column, table) for column in chosen.values() if column not in table]
-    if "time" not in table:
-        faults.append(f"{name} has no time. Allowed: a variable `time`; the first column of a CSV file.")
+    axis, unit = ("frequency", "Hz") if "frequency" in table else ("time", "s")
+    if axis not in table:
+        faults.append(f"{name} has no time. Allowed: a variable `time` or `frequency`; the first column of a CSV file.")
     if not chosen:
         faults.append(
             f"{name}: none of its columns ({', '.join(table) or 'none'}) is an output of the scene. Name them so, or "
@@ -105,18 +167,39 @@ def _trial(
         )
     if faults:
         raise RequestError("\n".join(faults))
-    t = _in_si(f"{name}, time", *table["time"], "s")
+    t = _in_si(f"{name}, {axis}", *table[axis], unit)
     found = {key: _in_si(f"{name}, {column}", *table[column], infos[key].unit) for key, column in chosen.items()}
     if t.ndim != 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0.0):
         raise RequestError(
-            f"{name}: its times do not increase throughout. Allowed: increasing finite times. Sort them."
+            f"{name}: values of {axis} do not increase throughout. Allowed: increasing finite numbers. Sort them."
         )
     for key, values in found.items():
         if values.shape != t.shape:
-            raise RequestError(f"{name}, {key}: {values.shape} values for {len(t)} times. Give one for each.")
+            raise RequestError(
+                f"{name}, {key}: {values.shape} values for {len(t)} numbers of {axis}. Give one for each."
+            )
         if np.count_nonzero(np.isfinite(values)) < FEWEST or np.nanstd(values) == 0.0:
             raise RequestError(f"{name}, {key}: allowed are signals of {FEWEST} samples or more that are not constant.")
-    return Trial(name=name, t=t, signals=found, parameters=dict(numbers))
+    if axis == "time":
+        return Trial(name=name, t=t, signals=found, parameters=dict(numbers))
+    if not t[0] > 0.0 or len(t) > MOST_LINES:
+        raise RequestError(
+            f"{name}: {len(t)} lines from {t[0]:g} Hz on. Allowed: {MOST_LINES} above 0 Hz. Leave others out."
+        )
+    spectra = []
+    for key, values in found.items():
+        kept = np.isfinite(values)
+        spectra.append(
+            MeasuredQuantities(
+                name=f"spectrum of {key} of {name}",
+                names=tuple(f"amplitude:{key}@{frequency!r}Hz" for frequency in t[kept].tolist()),
+                unit=infos[key].unit,
+                frequencies=t[kept],
+                values=values[kept],
+                sizes=np.ones(np.count_nonzero(kept)),
+            )
+        )
+    return Trial(name=name, t=np.zeros(0), signals={}, parameters=dict(numbers), quantities=tuple(spectra))
 
 
 def _in_si(what: str, values: np.ndarray, unit: str, wanted: str) -> np.ndarray:
@@ -131,8 +214,8 @@ def _quantity(what: str, text: str, unit: str) -> float:
         raise RequestError(f"{what}: {error}") from None
 
 
-def _csv(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, str]]:
-    """Columns with their units, and assignments in comments."""
+def _csv(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
+    """Columns with their units, or rows of quantities, and assignments in comments."""
     try:
         text = read_file(path, LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
@@ -142,6 +225,8 @@ def _csv(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str,
     said = dict(_assigned(line) for line in lines if line.startswith("#") and "=" in line)
     rows = [line for line in lines if not line.startswith("#")]
     heads = [_head(cell) for cell in next(csv.reader(rows[:1]), [])]
+    if heads and heads[0][0] == "quantity":
+        return {"quantity": (list(csv.reader(rows[1:])), "")}, said
     try:
         values = np.loadtxt(rows[1:], delimiter=",", ndmin=2, converters=lambda cell: float(cell.strip() or "nan"))
     except ValueError as error:
@@ -149,7 +234,8 @@ def _csv(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str,
     if not heads or values.shape[1:] != (len(heads),):
         raise RequestError(f"{path}: {len(heads)} names for {values.shape[-1]} columns. Name each in the first line.")
     table = {name: (column, unit) for (name, unit), column in zip(heads, values.T, strict=True)}
-    return {"time": (values[:, 0], heads[0][1])} | table, said
+    axis = "frequency" if heads[0][0] == "frequency" else "time"
+    return {axis: (values[:, 0], heads[0][1])} | table, said
 
 
 def _assigned(line: str) -> tuple[str, str]:
@@ -163,7 +249,7 @@ def _head(cell: str) -> tuple[str, str]:
     return name.strip(), unit.strip()
 
 
-def _netcdf(path: str | Path) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, str]]:
+def _netcdf(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
     """Variables of one dimension with their units, and attributes that are texts."""
     import h5netcdf
 

@@ -66,24 +66,27 @@ class ParameterRange:
         return self.high - self.low
 
 
-def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool = False) -> ParameterRange:
+def parameter_range(
+    manifest: Manifest, option: str, text: str, *, counted: bool = False, deviations: bool = False
+) -> ParameterRange:
     """Read a range.
 
     Parameters
     ----------
     option : what the caller calls it, for messages
     counted : whether a count of values belongs to it
+    deviations : whether it is of changes of the parameter, to which the parameter's bounds do not apply
 
     Raises
     ------
     RequestError
         Another form, an unknown parameter, a wrong unit, or ends that are equal or out of bounds.
     """
-    shape = "PATH=A:B:N" if counted else "PATH=A:B or PATH=A:B:log"
+    shape = "PATH=A:B:N" if counted else "PATH=A:B" if deviations else "PATH=A:B or PATH=A:B:log"
     example = 'bearing.clearance="5 um:40 um' + (':80"' if counted else '"')
     path, equals, written = (part.strip() for part in text.partition("="))
     parts = [part.strip() for part in written.split(":")]
-    logarithmic = not counted and parts[2:] == ["log"]
+    logarithmic = not (counted or deviations) and parts[2:] == ["log"]
     if not equals or len(parts) != (3 if counted or logarithmic else 2):
         raise RequestError(f"{option}: {text!r:.80} is no range. Allowed: {shape}, as in {example}.")
     infos = {info.name: info for info in manifest.parameters}
@@ -96,7 +99,7 @@ def parameter_range(manifest: Manifest, option: str, text: str, *, counted: bool
         raise RequestError(f"{option} {path}: {error}") from None
     if low == high:
         raise RequestError(f"{option} {path}: both ends are {parts[0]}. Allowed: two ends that differ.")
-    if outside(info, np.array([low, high])).any():
+    if not deviations and outside(info, np.array([low, high])).any():
         raise RequestError(f"{option} {path}: {written} goes beyond its bounds. Allowed: numbers {bounds_text(info)}.")
     if logarithmic and min(low, high) <= 0.0:
         raise RequestError(f"{option} {path}: numbers from zero down have no logarithm. Leave :log away.")

@@ -1,4 +1,4 @@
-"""A measured signal, the fitted model, and what is left: differences over time, and their correlation.
+"""A measured signal, the fitted model, and what is left: differences, and their correlation.
 
 In: samples.  Out: a figure.
 """
@@ -16,27 +16,33 @@ LAGS = 60
 
 @styled
 def draw_residuals(
-    name: str, unit: str, noise: float, t: np.ndarray, measured: np.ndarray, model: np.ndarray
+    name: str, unit: str, axis: str, noise: float, t: np.ndarray, measured: np.ndarray, model: np.ndarray
 ) -> Figure:
     """Signal above, differences over noise below, their correlation at the right.
 
     Parameters
     ----------
+    axis : "time", "frequency", or "quantity" for values of their own
     noise : deviation of the differences
     """
     figure = new_figure(5.2)
     panels = figure.subplot_mosaic([["signal", "signal"], ["left", "correlation"]], width_ratios=(2.0, 1.0))
     above, below, beside = panels["signal"], panels["left"], panels["correlation"]
-    above.plot(t, measured, ".", color=GREY, markersize=2.0, label="measured", rasterized=True)
-    above.plot(t, model, **{**FIRST, "linewidth": 0.9}, label="model")
-    above.set_xlabel(label("time", "s"))
+    along = {"time": label("time", "s"), "frequency": label("frequency", "Hz"), "quantity": "number of the quantity"}[
+        axis
+    ]
+    dot = 2.0 if axis == "time" else 6.0
+    above.plot(t, measured, ".", color=GREY, markersize=dot, label="measured", rasterized=True)
+    line = {"linewidth": 0.9} if axis != "quantity" else {"linestyle": "none", "marker": "x"}
+    above.plot(t, model, **{**FIRST, **line}, label="model")
+    above.set_xlabel(along)
     above.set_ylabel(label(name, unit))
     above.legend(loc="upper right")
     left = (model - measured) / noise
-    below.plot(t, left, ".", color=INK, markersize=2.0, rasterized=True)
+    below.plot(t, left, ".", color=INK, markersize=dot, rasterized=True)
     for level in (-1.96, 1.96):
         below.axhline(level, color=SIGNAL, linewidth=1.0, linestyle=(0, (5, 2)))
-    below.set_xlabel(label("time", "s"))
+    below.set_xlabel(along)
     below.set_ylabel("difference over noise")
     away = left - np.mean(left)
     lags = min(LAGS, len(away) - 1)

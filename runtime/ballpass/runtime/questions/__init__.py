@@ -11,6 +11,7 @@ from ballpass.runtime.questions.fit import fit
 from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
+from ballpass.runtime.questions.morris import morris
 from ballpass.runtime.questions.optimize import optimize
 from ballpass.runtime.questions.section import section
 from ballpass.runtime.questions.sensitivity import sensitivity
@@ -27,6 +28,7 @@ class Questions:
     fit = fit
     life = life
     linearize = linearize
+    morris = morris
     optimize = optimize
     section = section
     sensitivity = sensitivity

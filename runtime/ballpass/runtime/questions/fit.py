@@ -1,4 +1,4 @@
-"""Parameters from measured signals: values with intervals, and in words what the data do not determine."""
+"""Parameters from measurements: values with intervals, and in words what the data do not determine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.options import Option, Rtol
+from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -36,12 +36,19 @@ CANDIDATES = 8
 #: Tolerance of the runs where none is given [1].
 DEFAULT_RTOL = 1e-9
 
+#: Differences from quantities in their deviations from which on the report warns of them [1].
+FAR = 3.0
+
 #: Correlation of two unknowns from which on the report names it.
 CORRELATED = 0.9
 
 Data = Annotated[
     str | Path | Mapping[str, Any] | Sequence[Any],
-    Option(words="Files of measured signals: CSV or NetCDF, one for each trial.", shown="DATA", behind_scene=True),
+    Option(
+        words="Files of measured signals, spectra or quantities: CSV or NetCDF, one for each trial.",
+        shown="DATA",
+        behind_scene=True,
+    ),
 ]
 Vary = Annotated[
     str | Sequence[str],
@@ -168,13 +175,14 @@ class UndeterminedGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FittedSignal:
-    """A measured signal and the model's.
+    """A measured signal, spectrum or quantities, and the model's.
 
     Attributes
     ----------
     name, unit : of the signal
-    t : times as recorded, shape (samples,) [s]
-    measured, model : samples, of the same shape
+    axis : ``time``, ``frequency``, or ``quantity``
+    t : times as recorded [s], or frequencies [Hz], or numbers of quantities, shape (samples,)
+    measured, model : samples, of the same shape; of quantities over their deviations, or else over the measured values
     noise : deviation of the differences, by the median for a robust loss
     correlation : of differences with the next one [1]
 
@@ -190,6 +198,7 @@ class FittedSignal:
 
     name: str
     unit: str
+    axis: str
     t: np.ndarray
     measured: np.ndarray
     model: np.ndarray
@@ -208,7 +217,7 @@ class FittedSignal:
         >>> model.fit(data, "bearing.clearance=5 um:30 um").signals[0].white
         True
         """
-        return abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
+        return self.axis == "quantity" or abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -265,8 +274,10 @@ class FitAnswer(ShortRepr, Reported):
                     f"Determined is {one.combination} = {one.value:.6g} in SI, ± {100.0 * one.deviation:.2g} %."
                 )
         said += [
-            f"Noise of {one.name}: {one.noise:.3g} {one.unit}, {100.0 * one.noise / float(np.std(one.measured)):.2g} % "
-            "of the signal"
+            f"Differences of {one.name}: {one.noise:.3g} of their deviations, or of values without one"
+            if one.axis == "quantity"
+            else f"Noise of {one.name}: {one.noise:.3g} {one.unit}, "
+            f"{100.0 * one.noise / float(np.std(one.measured)):.2g} % of the signal"
             for one in self.signals
         ]
         pairs = np.argwhere(np.triu(np.abs(np.nan_to_num(self.correlations)), 1) > CORRELATED)
@@ -289,6 +300,12 @@ class FitAnswer(ShortRepr, Reported):
             "white noise: the model leaves something out, or the noise is filtered. They are too narrow then."
             for one in self.signals
             if not one.white
+        ]
+        warned += [
+            f"{one.name}: the model differs by {one.noise:.3g} of their deviations. It leaves something out, the "
+            "deviations are too small, or the search ended elsewhere: give more starts or narrower bounds."
+            for one in self.signals
+            if one.axis == "quantity" and one.noise > FAR
         ]
         facts = {
             "numbers": [asdict(one) for one in self.numbers],
@@ -333,7 +350,7 @@ def _figures(_model: AnyModel, found: FitAnswer, _parameters: object) -> Iterato
     from ballpass.runtime.plot.residuals import draw_residuals
 
     for k, one in enumerate(found.signals, start=1):
-        words = (one.name, one.unit, one.noise)
+        words = (one.name, one.unit, one.axis, one.noise)
         yield ("residuals" if k == 1 else f"residuals_{k}"), draw_residuals(*words, one.t, one.measured, one.model)
 
 
@@ -355,18 +372,23 @@ def fit(
     loss: Loss = "linear",
     profile: Profile = False,
     starts: FitStarts = 3,
+    cycles: Cycles = None,
+    transient: Transient = None,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
+    keep: str | Path | None = None,
     progress: Progress = None,
 ) -> FitAnswer:
     """Find parameters from measured signals by least squares, with exact derivatives of the run.
 
-    What the data do not determine is named, not given as a number. In Python, data may also be mappings with `time` and
-    arrays by output, SI, one for each trial.
+    Data are outputs over time, amplitudes over the frequency, or quantities; turns and transient are those of runs for
+    the latter two. What the data do not determine is named, not given as a number. In Python, data may be mappings, SI,
+    one for each trial: `time` or `frequency` with arrays by output, or quantities, as pairs with their deviations.
 
     Parameters
     ----------
     parameters : overrides of other parameters, SI
+    keep : folder for what is computed, by which a call that was killed continues; deleted at the end
     progress : as for `simulate`
 
     Raises
@@ -388,6 +410,7 @@ def fit(
     from scipy.stats.qmc import Halton
 
     from ballpass.runtime.ask.fitting import best_of, fit_unknowns
+    from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.measured import read_columns, read_trial
     from ballpass.runtime.ask.misfit import Misfit
     from ballpass.runtime.ask.parameter_range import parameter_range
@@ -409,12 +432,15 @@ def fit(
         offset=offset,
         parameters=dict(parameters or {}),
         rtol=tolerance,
+        cycles=cycles,
+        transient=transient,
     )
     shares = Halton(len(misfit.ranged), scramble=False).random(CANDIDATES * starts)
     shares[0] = misfit.shares_of(model.numbers(parameters).parameters)  # in place of a corner
     shares = np.clip(shares, INSIDE, 1.0 - INSIDE)
     found = []
-    with shown("fitting", progress) as tell:
+    decides = (texts, *misfit.decides)
+    with kept_parts(keep, model, *decides) as misfit.parts, shown("fitting", progress) as tell:
         for k in range(starts):
             begun = best_of(misfit, shares[CANDIDATES * k : CANDIDATES * (k + 1)])
             told = None if tell is None else lambda done, k=k: tell((k + done) / starts)
@@ -448,9 +474,9 @@ def _refuse_chaos(model: AnyModel, misfit: Misfit, fitted: Fitted) -> None:
 
     if not (model.states and model.has_stepper):
         return
-    for numbers, length in misfit.runs(fitted.counts):
-        names = list(dict.fromkeys(one.output for one in misfit.records))
-        refuse_growth(model, numbers, Request(duration=length, transient_cycles=0.0), names)
+    for k, run in enumerate(misfit.runs(fitted.counts)):
+        names = list(dict.fromkeys(name for one in misfit.records if one.trial == k for name in one.channels))
+        refuse_growth(model, run.numbers, Request(duration=run.duration, transient_cycles=0.0), names)
 
 
 def _answer(
@@ -499,6 +525,7 @@ def _answer(
         FittedSignal(
             name=record.name,
             unit=record.unit,
+            axis=record.axis,
             t=record.t,
             measured=record.values,
             model=record.values + difference,

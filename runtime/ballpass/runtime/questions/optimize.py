@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -37,6 +40,12 @@ AGREES = 1e-3
 #: Tolerance of the runs [1].
 RTOL = 1e-8
 
+#: Most tolerances; points within their box, beside its corners, of which the worst is taken; further ones that check.
+MOST_TOLERANCES, WITHIN, FURTHER = 6, 15, 256
+
+#: A further point that is worse by more is warned of, as a share of the goal [1].
+WORSE = 1e-3
+
 #: A constraint, or a bound, is active within this share of its limit, or of the range [1].
 ACTIVE = 1e-5
 
@@ -52,6 +61,15 @@ Vary = Annotated[
 Limits = Annotated[
     str | Sequence[str] | None,
     Option(words="Limit of another quantity. May be repeated.", shown='"Q <= VALUE"', example='"rms:inner.y <= 5 um"'),
+]
+Tolerance = Annotated[
+    str | Sequence[str] | None,
+    Option(
+        words="Deviations of a parameter from its value: goal and limits are then the worst within all of them. May be "
+        "repeated.",
+        shown="PATH=A:B",
+        example='bearing.clearance="-2 um:2 um"',
+    ),
 ]
 Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
 
@@ -96,6 +114,10 @@ class Optimum(ShortRepr, Reported):
     starts : where each search began and the value where it ended, SI: pairs of tuple and number
     trace : values of the goal of the best search, in order [unit]
     converged : whether the search ended by itself
+    tolerances : deviations within which all values are the worst; none for values without deviations
+    worst : the deviations where the goal is worst, SI
+    nominal : the goal without deviations [unit]
+    further : the worst goal at points of the box that the search did not see; NaN without tolerances [unit]
 
     Examples
     --------
@@ -117,6 +139,10 @@ class Optimum(ShortRepr, Reported):
     starts: tuple[tuple[tuple[float, ...], float], ...]
     trace: tuple[float, ...]
     converged: bool
+    tolerances: tuple[ParameterRange, ...]
+    worst: tuple[float, ...]
+    nominal: float
+    further: float
 
     @property
     def kinked(self) -> bool:
@@ -142,7 +168,7 @@ class Optimum(ShortRepr, Reported):
             for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
         ]
         table = ReportTable(
-            title=f"Least {self.goal}: {self.value:.9g} {self.unit}",
+            title=f"Least {'worst ' if self.tolerances else ''}{self.goal}: {self.value:.9g} {self.unit}",
             heads=("parameter", "value", "unit", "held by", f"slope [{self.unit} per SI unit]"),
             rows=[
                 (
@@ -165,6 +191,15 @@ class Optimum(ShortRepr, Reported):
             )
             for limit in self.limits
         ]
+        if self.tolerances:
+            deviations = ", ".join(
+                f"{one.name} {value / one.factor:+.6g} {one.shown_unit}"
+                for one, value in zip(self.tolerances, self.worst, strict=True)
+            )
+            said.append(
+                f"Worst at {deviations}. Without deviations {self.goal} is {self.nominal:.7g} {self.unit}; at "
+                f"{FURTHER} more points of the tolerances it is at most {self.further:.7g} {self.unit}."
+            )
         if self.kinked:
             said.append(
                 f"A kink: {len(self.slopes)} smooth parts meet here, and the goal grows on each side. Slopes are those "
@@ -184,30 +219,33 @@ class Optimum(ShortRepr, Reported):
             fault = f"No values within the bounds keep the limit of {', '.join(broken)}."
         elif not self.converged:
             fault = "The search did not end by itself. Give more starts or narrower bounds."
+        warned = []
+        if self.further > self.value + WORSE * abs(self.value):
+            warned.append(
+                f"{self.goal} is {self.further:.6g} {self.unit} at a point within the tolerances at which the search "
+                "did not evaluate it: the worst is larger than the value given. Give narrower tolerances."
+            )
         facts = {
             "goal": self.goal,
             "unit": self.unit,
             "value": self.value,
             "parameters": rows,
             "kinked": self.kinked,
-            "limits": [
-                {
-                    "quantity": one.quantity,
-                    "unit": one.unit,
-                    "upper": one.upper,
-                    "limit": one.limit,
-                    "value": one.value,
-                    "active": one.active,
-                    "multiplier": one.multiplier,
-                }
-                for one in self.limits
-            ],
+            "limits": [asdict(one) for one in self.limits],
             "verdicts": [list(pair) for pair in self.verdicts],
             "starts": [{"start": list(start), "end": end} for start, end in self.starts],
             "trace": list(self.trace),
             "converged": self.converged,
+            "tolerances": [
+                {"parameter": one.name, "low": one.low, "high": one.high, "worst": value}
+                for one, value in zip(self.tolerances, self.worst, strict=True)
+            ],
+            "nominal": self.nominal,
+            "further": self.further,
         }
-        return Report(parts=(table, *said), facts=facts, records=rows, index=("parameter",), fault=fault)
+        return Report(
+            parts=(table, *said), facts=facts, records=rows, index=("parameter",), warnings=warned, fault=fault
+        )
 
 
 def _over(limit: Limit) -> float:
@@ -260,9 +298,11 @@ def optimize(
     cycles: Cycles = None,
     *,
     subject_to: Limits = None,
+    tolerance: Tolerance = None,
     starts: Starts = 3,
     transient: Transient = None,
     parameters: Mapping[str, float] | None = None,
+    keep: str | Path | None = None,
     progress: Progress = None,
 ) -> Optimum:
     """Find the least value of a quantity over parameters, also where it has a kink.
@@ -273,6 +313,7 @@ def optimize(
     Parameters
     ----------
     parameters : overrides of other parameters, SI
+    keep : folder for what is computed, by which a call that was killed continues; deleted at the end
     progress : as for `simulate`
 
     Raises
@@ -292,53 +333,74 @@ def optimize(
     from scipy.stats.qmc import Halton
 
     from ballpass.runtime.ask.bundle import Plane, minimize_by_planes
+    from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.certify.quantity_function import QuantityFunction
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
 
-    texts = [vary] if isinstance(vary, str) else list(vary)
-    ranges = tuple(parameter_range(model.manifest, "vary", text) for text in texts)
-    given = [subject_to] if isinstance(subject_to, str) else list(subject_to or [])
-    limits = [read_limit(model, text) for text in given]
+    ranges = tuple(parameter_range(model.manifest, "vary", text) for text in _texts(vary))
+    box = tuple(parameter_range(model.manifest, "tolerance", text, deviations=True) for text in _texts(tolerance))
+    if len(box) > MOST_TOLERANCES:
+        raise RequestError(
+            f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."
+        )
+    limits = [read_limit(model, text) for text in _texts(subject_to)]
     names = list(dict.fromkeys([minimize, *(one.quantity for one in limits)]))
-    wrt = [one.name for one in ranges]
+    count = len(ranges)
+    every = list(dict.fromkeys(one.name for one in (*ranges, *box)))
     lanes, exact = (
-        QuantityFunction(model, names, wrt, cycles, transient=transient, parameters=parameters, rtol=RTOL, kinks=kinks)
+        QuantityFunction(
+            model, names, every, cycles, transient=transient, parameters=parameters, rtol=RTOL, kinks=kinks
+        )
         for kinks in (None, "located")
     )
-    signs = np.array([1.0 if one.upper else -1.0 for one in limits])
-    sizes = np.array([max(abs(one.limit), 1e-300) for one in limits])
-    rows = [names.index(one.quantity) for one in limits]
-    count = CANDIDATES * starts
-    shares = Halton(len(ranges), scramble=False).random(count + 1)[1:]  # the first is a corner
+    deviations = _deviations(every, box)
+    columns = [0, *(names.index(one.quantity) for one in limits)]
+    signs = np.array([1.0, *(1.0 if one.upper else -1.0 for one in limits)])
+    offsets = np.array([0.0, *(one.limit for one in limits)])
+    shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
 
-    def values_at(share: np.ndarray) -> np.ndarray:
-        return np.array([one.at(float(s)) for one, s in zip(ranges, share, strict=True)])
+    def rows_at(share: np.ndarray) -> np.ndarray:
+        """Values of all parameters with each deviation, the first with none."""
+        x = exact.start.copy()
+        x[:count] = [one.at(float(s)) for one, s in zip(ranges, share, strict=True)]
+        found: np.ndarray = x + deviations
+        return found
 
-    def functions(values: np.ndarray, size: float) -> np.ndarray:
-        bounded = [
-            signs[k] * (values[row] - one.limit) / sizes[k]
-            for k, (row, one) in enumerate(zip(rows, limits, strict=True))
-        ]
-        return np.array([values[0] / size, *bounded])
+    with (
+        kept_parts(keep, model, names, every, cycles, transient, parameters, RTOL, deviations) as parts,
+        shown("searching", progress) as tell,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
+        (first,) = parts.once(shares, lambda: (lanes(np.array([rows_at(share) for share in shares])),))
+        scaled = signs * (first[..., columns] - offsets)
+        sizes = np.array([float(np.median(np.abs(first[..., 0]))), *(abs(one.limit) for one in limits)])
+        sizes = np.maximum(sizes, 1e-300)
 
-    with shown("searching", progress) as tell:
-        first = lanes(np.array([values_at(share) for share in shares]))
-        size = max(float(np.median(np.abs(first[:, 0]))), 1e-300)
+        def worst_at(share: np.ndarray) -> np.ndarray:
+            """The deviation with the worst value of goal and each limit."""
+            if len(deviations) == 1:
+                return np.zeros(len(columns), dtype=int)
+            found: np.ndarray = np.argmax(signs * lanes(rows_at(share))[:, columns], axis=0)
+            return found
+
+        def exactly(share: np.ndarray) -> tuple[np.ndarray, ...]:
+            which = worst_at(share)
+            rows, place = np.unique(which, return_inverse=True)
+            x = rows_at(share)[rows]
+            return exact(x)[place, columns], exact.jacobian(x)[place, columns, :count], which
 
         def evaluate(share: np.ndarray) -> Plane:
-            x = values_at(share)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
-                values, slopes = exact(x), exact.jacobian(x)
-            slopes = slopes * np.array([one.slope(float(s)) for one, s in zip(ranges, share, strict=True)])
-            scaled = [slopes[0] / size, *(signs[k] * slopes[row] / sizes[k] for k, row in enumerate(rows))]
-            return Plane(x=share, values=functions(values, size), slopes=np.array(scaled))
+            values, slopes, _ = parts.once(share, lambda: exactly(share))
+            by_share = np.array([one.slope(float(s)) for one, s in zip(ranges, share, strict=True)])
+            size = (signs / sizes)[:, None]
+            return Plane(x=share, values=signs * (values - offsets) / sizes, slopes=size * slopes * by_share)
 
-        merits = np.array(
-            [Plane(x=s, values=functions(v, size), slopes=v).merit for s, v in zip(shares, first, strict=True)]
-        )
+        merits = [
+            Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, (scaled / sizes).max(axis=1), strict=True)
+        ]
         found = []
         for block in range(starts):
             at = CANDIDATES * block + int(np.argmin(merits[CANDIDATES * block : CANDIDATES * (block + 1)]))
@@ -352,40 +414,71 @@ def optimize(
         for side in sides:
             away = side.x - best.x
             there = best.x if len(sides) == 1 else best.x + BESIDE * away / max(float(np.max(np.abs(away))), 1e-300)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", KinkWarning)
-                report = exact.certify(values_at(np.clip(there, 0.0, 1.0)), progress=False)
-                taken = exact.jacobian(values_at(np.clip(there, 0.0, 1.0)))[0]
-            for pair in report.pairs:
-                verdict = pair.check.verdict.value
-                slope = float(taken[wrt.index(pair.parameter)]) if pair.quantity == minimize else 0.0
-                if pair.quantity == minimize and abs(slope - pair.by_steps) > AGREES * abs(slope):
-                    verdict = "disagrees"
-                if pair.quantity == minimize and verdicts.get(pair.parameter) != "disagrees":
-                    verdicts[pair.parameter] = verdict
+            there = np.clip(there, 0.0, 1.0)
+            row = rows_at(there)[worst_at(there)[0]]
+            taken = exact.jacobian(row)[0]
+            for pair in exact.certify(row, progress=False).pairs:
+                if pair.quantity != minimize or pair.parameter not in every[:count]:
+                    continue
+                slope = float(taken[every.index(pair.parameter)])
+                agrees = abs(slope - pair.by_steps) <= AGREES * abs(slope)
+                if verdicts.get(pair.parameter) != "disagrees":
+                    verdicts[pair.parameter] = pair.check.verdict.value if agrees else "disagrees"
+        rows = rows_at(best.x)
+        worst = deviations[worst_at(best.x)[0]]
+        nominal, further = float(best.values[0] * sizes[0]), math.nan
+        if box:
+            spread = Halton(len(box), scramble=False).random(FURTHER + WITHIN + 1)[WITHIN + 1 :]
+            nominal = float(exact(rows[0])[0])
+            further = float(np.max(lanes(rows[0] + _placed(every, box, spread))[:, 0]))
+    size = sizes[0]
     by_share = np.array([one.slope(float(s)) for one, s in zip(ranges, best.x, strict=True)])
     return Optimum(
         goal=minimize,
         unit=quantities_of(model, [minimize])[0].unit,
-        value=float(best.values[0]) * size,
+        value=float(best.values[0] * size),
         vary=ranges,
-        x=values_at(best.x),
+        x=rows[0, :count],
         bounds=tuple("first" if s < ACTIVE else "second" if s > 1.0 - ACTIVE else "" for s in best.x.tolist()),
         slopes=np.array([side.slopes[0] * size / by_share for side in sides]),
         limits=tuple(
-            Limit(
-                quantity=one.quantity,
-                unit=one.unit,
-                upper=one.upper,
-                limit=one.limit,
-                value=float(one.limit + signs[k] * best.values[k + 1] * sizes[k]),
-                active=bool(abs(best.values[k + 1]) < ACTIVE),
-                multiplier=-float(signs[k] * least.multipliers[k] * size / sizes[k]),
+            replace(
+                one,
+                value=float(one.limit + signs[k] * best.values[k] * sizes[k]),
+                active=bool(abs(best.values[k]) < ACTIVE),
+                multiplier=-float(signs[k] * least.multipliers[k - 1] * size / sizes[k]),
             )
-            for k, one in enumerate(limits)
+            for k, one in enumerate(limits, start=1)
         ),
         verdicts=tuple(verdicts.items()),
-        starts=tuple((tuple(values_at(share).tolist()), float(one.best.values[0]) * size) for share, one in found),
-        trace=tuple(float(one.values[0]) * size for one in least.trace),
+        starts=tuple((tuple(rows_at(s)[0, :count].tolist()), float(one.best.values[0] * size)) for s, one in found),
+        trace=tuple(float(one.values[0] * size) for one in least.trace),
         converged=least.converged,
+        tolerances=box,
+        worst=tuple(float(worst[every.index(one.name)]) for one in box),
+        nominal=nominal,
+        further=further,
     )
+
+
+def _texts(given: str | Sequence[str] | None) -> list[str]:
+    return [given] if isinstance(given, str) else list(given or [])
+
+
+def _deviations(names: Sequence[str], box: Sequence[ParameterRange]) -> np.ndarray:
+    """Deviations of all parameters: none, the corners of the box, and points within, shape (points, parameters)."""
+    from scipy.stats.qmc import Halton
+
+    if not box:
+        return np.zeros((1, len(names)))
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(box))))
+    within = Halton(len(box), scramble=False).random(WITHIN + 1)[1:]
+    return np.concatenate([np.zeros((1, len(names))), _placed(names, box, np.concatenate([corners, within]))])
+
+
+def _placed(names: Sequence[str], box: Sequence[ParameterRange], shares: np.ndarray) -> np.ndarray:
+    """Deviations of all parameters from shares of the box."""
+    found = np.zeros((len(shares), len(names)))
+    for one, column in zip(box, shares.T, strict=True):
+        found[:, names.index(one.name)] = one.low + column * (one.high - one.low)
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.variance_shares import VarianceShare
-    from ballpass.runtime.many.distributions import Distribution
-
-#: Most members.
-MOST = 10_000_000
 
 #: Quantiles in the report.
 QUANTILES = (0.05, 0.5, 0.95)
@@ -239,6 +236,7 @@ def sobol(
     seed: Seed = 1,
     transient: Transient = None,
     parameters: Mapping[str, float] | None = None,
+    keep: str | Path | None = None,
     progress: Progress = None,
 ) -> SobolAnswer:
     """Find which uncertain inputs make a quantity vary, and how many members keep limits.
@@ -249,6 +247,7 @@ def sobol(
     Parameters
     ----------
     parameters : overrides of other parameters, SI
+    keep : folder for members that were run, by which a call that was killed continues; deleted at the end
     progress : as for `simulate`
 
     Raises
@@ -266,51 +265,34 @@ def sobol(
     """
     from scipy.stats.qmc import Sobol
 
-    from ballpass.runtime.ask.parameter_distribution import parameter_distribution
+    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_members, values_of, words_of
     from ballpass.runtime.ask.variance_shares import variance_shares, wilson
-    from ballpass.runtime.many.ensemble import simulate_many
     from ballpass.runtime.quantity.grammar import quantities_of
 
-    texts = [vary] if isinstance(vary, str) else list(vary)
-    pairs = [parameter_distribution(model.manifest, "vary", text) for text in texts]
-    inputs = tuple(name for name, _ in pairs)
-    if not inputs or len(set(inputs)) < len(inputs):
-        raise RequestError(f"vary: one parameter or more is expected, each once, not {list(inputs)!r}.")
+    inputs = read_inputs(model, vary)
     limits = [read_limit(model, text) for text in ([limit] if isinstance(limit, str) else list(limit or []))]
     names = [of] if isinstance(of, str) else list(of or [])
     names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
     units = [one.unit for one in quantities_of(model, names)]
     count = len(inputs)
-    if samples * (count + 2) > MOST:
-        raise RequestError(f"samples: {samples * (count + 2)} members. Allowed: {MOST}. Give fewer samples.")
+    check_count(samples * (count + 2))
     drawn = Sobol(2 * count, scramble=True, seed=np.random.default_rng(seed)).random(samples)
-    a, b = (_inputs(pairs, part) for part in (drawn[:, :count], drawn[:, count:]))
+    a, b = values_of(inputs, drawn[:, :count]), values_of(inputs, drawn[:, count:])
     rows = [a]
     if indices:
-        rows.append(b)
-        for k in range(count):
-            rows.append(a.copy())
-            rows[-1][:, k] = b[:, k]
-    every = np.concatenate(rows)
-    table = {name: np.full(len(every), value) for name, value in (parameters or {}).items()}
+        rows += [b, *(np.where(np.arange(count) == k, b, a) for k in range(count))]
     with shown("simulating", progress) as tell:
-        found = simulate_many(
+        values, faults = run_members(
             model,
-            table | dict(zip(inputs, every.T, strict=True)),
+            tuple(inputs),
+            np.concatenate(rows),
             names,
             cycles=cycles,
-            duration=None,
             transient=transient,
-            rtol=None,
-            method=None,
-            kinks=None,
-            threads=None,
-            lanes=True,
+            parameters=parameters,
+            keep=keep,
             progress=tell,
         )
-    if found.interrupted:
-        raise KeyboardInterrupt
-    values = np.array([found[name] for name in names]).T
     base = values[: 2 * samples] if indices else values
     quantities = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
@@ -339,24 +321,15 @@ def sobol(
         share = hits / len(known) if len(known) else math.nan
         kept.append(KeptLimit(words=words, kept=hits, members=len(known), share=share, low=low, high=high))
     return SobolAnswer(
-        inputs=inputs,
-        distributions=tuple(_words(one) for _, one in pairs),
+        inputs=tuple(inputs),
+        distributions=tuple(words_of(one) for one in inputs.values()),
         quantities=tuple(quantities),
         limits=tuple(kept),
         samples=samples,
         seed=seed,
-        members=len(every),
-        failed=len(found.failures),
-        fault=found.failures[0].message if found.failures else "",
+        members=len(values),
+        failed=len(faults),
+        fault=faults[0] if faults else "",
         base=np.concatenate(rows[:2]),
         values=base,
     )
-
-
-def _inputs(pairs: Sequence[tuple[str, Distribution]], shares: np.ndarray) -> np.ndarray:
-    """Values of the inputs from shares of smaller ones, shape (samples, inputs)."""
-    return np.stack([one.values(share) for (_, one), share in zip(pairs, shares.T, strict=True)], axis=1)
-
-
-def _words(one: Distribution) -> str:
-    return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"

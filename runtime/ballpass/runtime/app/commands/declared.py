@@ -7,6 +7,7 @@ before it is called.
 from __future__ import annotations
 
 import inspect
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -31,6 +32,7 @@ from ballpass.runtime.app.commands.shared import (
 )
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults
+from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
@@ -186,14 +188,18 @@ def _ask(
             values["progress"] = _progress(stages)
         if "scene" in ask.__annotations__:
             values["scene"] = scene
+        asked = _request(question, model, values, overrides)
+        if "keep" in ask.__annotations__ and folder is not None:
+            values["keep"] = folder / f"{question.name}.parts"
         answer = ask(model, **values, parameters=overrides)
         report = question.report(answer)
+        plain = to_plain(report) | {"request": asked}
         written: list[Path] = []
         if folder is not None:
             if not question.always:
                 folder.mkdir(parents=True, exist_ok=True)
                 written = [folder / f"{question.name}.json"]
-                written[0].write_text(json_text(to_plain(report)), encoding="utf-8")
+                written[0].write_text(json_text(plain), encoding="utf-8")
             if formats and question.figures is not None:
                 from ballpass.runtime.plot.style import write_figures
 
@@ -203,7 +209,6 @@ def _ask(
         for words in (*report.warnings, *_transient(question, model, values, overrides, answer)):
             warn(words)
     if json_:
-        plain = to_plain(report)
         show_json(plain | ({"figure": str(written[0])} if "figure" in plain and written else {}))
     else:
         show_report(report)
@@ -214,6 +219,22 @@ def _ask(
     if report.fault:
         complain(report.fault)
         raise typer.Exit(1)
+
+
+def _request(
+    question: Question, model: Any, values: Mapping[str, Any], overrides: Mapping[str, float]
+) -> dict[str, Any]:
+    """What repeats an answer: command, scene, version, options and overrides, SI."""
+    given = {name: value for name, value in values.items() if value is not None and not callable(value)}
+    return {
+        "command": question.name,
+        "scene": model.manifest.scene,
+        "source": model.manifest.source,
+        "signature": model.manifest.signature,
+        "version": __version__,
+        "options": json.loads(json.dumps(given, default=str)),
+        "parameters": dict(overrides),
+    }
 
 
 def _transient(

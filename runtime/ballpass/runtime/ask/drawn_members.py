@@ -1,0 +1,106 @@
+"""Members whose inputs are drawn from distributions: read from text, run in blocks that survive a kill.
+
+In: a model, texts, values of the inputs.  Out: values of quantities, NaN for members without results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ballpass.runtime.ask.kept_parts import Arrays, kept_parts
+from ballpass.runtime.ask.parameter_distribution import parameter_distribution
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.many.distributions import Distribution
+from ballpass.runtime.many.ensemble import simulate_many
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: Most members; those that are run together where they are kept: a tenth slower than all at once.
+MOST, BLOCK = 10_000_000, 1024
+
+
+def read_inputs(model: LoadedModel, vary: str | Sequence[str]) -> dict[str, Distribution]:
+    """Distributions of the inputs by name.
+
+    Raises
+    ------
+    RequestError
+        None, or one twice; or see `parameter_distribution`.
+    """
+    texts = [vary] if isinstance(vary, str) else list(vary)
+    pairs = [parameter_distribution(model.manifest, "vary", text) for text in texts]
+    found = dict(pairs)
+    if not found or len(found) < len(pairs):
+        raise RequestError(f"vary: one parameter or more is expected, each once, not {[name for name, _ in pairs]!r}.")
+    return found
+
+
+def check_count(members: int) -> None:
+    """Refuse more members than are allowed, before any is drawn."""
+    if members > MOST:
+        raise RequestError(f"samples: {members} members. Allowed: {MOST}. Give fewer samples.")
+
+
+def words_of(one: Distribution) -> str:
+    """A distribution with its arguments, SI."""
+    return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"
+
+
+def values_of(inputs: Mapping[str, Distribution], shares: np.ndarray) -> np.ndarray:
+    """Values of the inputs from shares of smaller ones, shape (members, inputs)."""
+    return np.stack([one.values(share) for one, share in zip(inputs.values(), shares.T, strict=True)], axis=1)
+
+
+def run_members(
+    model: LoadedModel,
+    inputs: Sequence[str],
+    members: np.ndarray,
+    names: Sequence[str],
+    *,
+    cycles: float | None,
+    transient: float | None,
+    parameters: Mapping[str, float] | None,
+    keep: str | Path | None,
+    progress: Callable[[float], None] | None,
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Values of quantities, shape (members, quantities), and messages of the members without results.
+
+    Parameters
+    ----------
+    inputs : names of the columns
+    members : values of the inputs, shape (members, inputs)
+    names : of the quantities
+    keep : see `kept_parts`
+    """
+    fixed = dict(parameters or {})
+    block = len(members) if keep is None else BLOCK
+
+    def run(first: int) -> Arrays:
+        some = members[first : first + block]
+        table: dict[str, object] = {name: np.full(len(some), value) for name, value in fixed.items()}
+        found = simulate_many(
+            model,
+            table | dict(zip(inputs, some.T, strict=True)),
+            names,
+            cycles=cycles,
+            duration=None,
+            transient=transient,
+            rtol=None,
+            method=None,
+            kinks=None,
+            threads=None,
+            lanes=True,
+            progress=None if progress is None else lambda done: progress((first + done * len(some)) / len(members)),
+        )
+        if found.interrupted:
+            raise KeyboardInterrupt
+        return np.array([found[name] for name in names]).T, np.array([one.message for one in found.failures], dtype=str)
+
+    with kept_parts(keep, model, tuple(inputs), tuple(names), cycles, transient, fixed) as parts:
+        blocks = [
+            parts.once(members[first : first + block], partial(run, first)) for first in range(0, len(members), block)
+        ]
+    return np.concatenate([values for values, _ in blocks]), tuple(str(one) for _, some in blocks for one in some)

@@ -1,0 +1,207 @@
+"""Which of many uncertain inputs matter at all: elementary effects by Morris, with few members."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.questions.sobol import Seed, Spread
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.elementary_effects import ElementaryEffect
+
+Of = Annotated[str | Sequence[str], Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q")]
+Base = Annotated[
+    int, Option(words="Base members N; there are N (inputs + 1) members.", shown="N", least=4, most=100_000)
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScreenedQuantity:
+    """A quantity and the effects of the inputs on it.
+
+    Attributes
+    ----------
+    name, unit : of the quantity
+    effects : of the inputs, in their order
+
+    Examples
+    --------
+    >>> found = model.morris("bearing.clearance=5 um:15 um", "rms:inner.y", cycles=3, base=8)
+    >>> found.quantities[0].name, found.quantities[0].unit
+    ('rms:inner.y', 'm')
+    """
+
+    name: str
+    unit: str
+    effects: tuple[ElementaryEffect, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class MorrisAnswer(ShortRepr, Reported):
+    """Effects of uncertain inputs on quantities.
+
+    Attributes
+    ----------
+    inputs : parameters that vary
+    distributions : of the inputs, in words
+    quantities : effects on each
+    seed, members : seed, members in all
+    failed : members without results, and `fault` of the first
+
+    Examples
+    --------
+    >>> vary = ["bearing.clearance=5 um:15 um", "mechanism.bodies.slider.mass=16 kg:17 kg"]
+    >>> found = model.morris(vary, "rms:inner.y", cycles=3, base=8)
+    >>> clearance, mass = found.quantities[0].effects
+    >>> found.members, clearance.size > mass.size
+    (24, True)
+    """
+
+    inputs: tuple[str, ...]
+    distributions: tuple[str, ...]
+    quantities: tuple[ScreenedQuantity, ...]
+    seed: int
+    members: int
+    failed: int
+    fault: str
+
+    def _report(self) -> Report:
+        parts, records = [], []
+        for one in self.quantities:
+            ranked = sorted(zip(self.inputs, one.effects, strict=True), key=lambda pair: -pair[1].size)
+            right = ("size", "mean", "deviation")
+            parts.append(
+                ReportTable(
+                    title=f"Effects on {one.name} [{one.unit}]",
+                    heads=("input", "size", "95 % interval", "mean", "deviation"),
+                    rows=[
+                        (
+                            name,
+                            f"{effect.size:.4g}",
+                            f"{effect.size_low:.4g} to {effect.size_high:.4g}",
+                            f"{effect.mean:.4g}",
+                            f"{effect.deviation:.4g}",
+                        )
+                        for name, effect in ranked
+                    ],
+                    right=right,
+                    caption="changes over the whole of an input's distribution; size: mean without signs",
+                )
+            )
+            records += [{"quantity": one.name, "input": name, **asdict(effect)} for name, effect in ranked]
+        warned = []
+        if self.failed:
+            warned.append(
+                f"{self.failed} of {self.members} members have no result, and were left out with those that they are "
+                f"compared with. The first: {self.fault}"
+            )
+        return Report(
+            parts=parts,
+            facts={**asdict(self), "first_fault": self.fault},
+            records=records,
+            index=("quantity", "input"),
+            warnings=warned,
+            fault="" if self.failed < self.members else "No member has a result.",
+        )
+
+
+def _figures(_model: AnyModel, found: MorrisAnswer, _parameters: object) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.effects import draw_effects
+
+    for k, one in enumerate(found.quantities):
+        yield ("morris" if k == 0 else f"morris_{k + 1}"), draw_effects(one.name, one.unit, found.inputs, one.effects)
+
+
+def _check(_values: Mapping[str, object]) -> None:
+    need("scipy")
+
+
+@Question(stage="simulate", figures=_figures, check=_check)
+def morris(
+    model: AnyModel,
+    vary: Spread,
+    of: Of,
+    cycles: Cycles = None,
+    *,
+    base: Base = 16,
+    seed: Seed = 1,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    keep: str | Path | None = None,
+    progress: Progress = None,
+) -> MorrisAnswer:
+    """Find which of many uncertain inputs matter at all, with few members.
+
+    Each base member is compared with others in which one input has moved by half of its distribution (Morris 1991).
+    What has a small effect can be left out of `sobol`, which takes many times the members.
+
+    Parameters
+    ----------
+    parameters : overrides of other parameters, SI
+    keep : folder for members that were run, by which a call that was killed continues; deleted at the end
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        Unknown names, or wrong distributions.
+
+    Examples
+    --------
+    >>> found = model.morris("bearing.clearance=5 um:15 um", "rms:inner.y", cycles=3, base=8)
+    >>> found.members
+    16
+    """
+    from scipy.stats.qmc import Halton
+
+    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_members, values_of, words_of
+    from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
+    from ballpass.runtime.quantity.grammar import quantities_of
+
+    inputs = read_inputs(model, vary)
+    names = list(dict.fromkeys([of] if isinstance(of, str) else of))
+    units = [one.unit for one in quantities_of(model, names)]
+    count = len(inputs)
+    check_count(base * (count + 1))
+    shares = Halton(count, scramble=True, seed=np.random.default_rng(seed)).random(base)
+    every = np.concatenate([shares, *moved(shares)])
+    with shown("simulating", progress) as tell:
+        values, faults = run_members(
+            model,
+            tuple(inputs),
+            values_of(inputs, every),
+            names,
+            cycles=cycles,
+            transient=transient,
+            parameters=parameters,
+            keep=keep,
+            progress=tell,
+        )
+    quantities = []
+    for name, unit, column in zip(names, units, values.T, strict=True):
+        first, *others = column.reshape(-1, base)
+        effects = elementary_effects(shares, first, np.array(others), seed)
+        quantities.append(ScreenedQuantity(name=name, unit=unit, effects=tuple(effects)))
+    return MorrisAnswer(
+        inputs=tuple(inputs),
+        distributions=tuple(words_of(one) for one in inputs.values()),
+        quantities=tuple(quantities),
+        seed=seed,
+        members=len(values),
+        failed=len(faults),
+        fault=faults[0] if faults else "",
+    )
