@@ -38,7 +38,13 @@ ON_CURVE = 0.02
 Section = Annotated[int, Option(words="Turns of which a point is kept.", shown="N", least=40, most=1_000_000)]
 Dropped = Annotated[int, Option(words="Turns at the start that do not count.", shown="N", least=0, most=1_000_000)]
 At = Annotated[
-    float, Option(words="Angle that driver or shaft has turned since t = 0 at each point.", shown="DEG", unit="deg")
+    float | None,
+    Option(
+        words="Angle that driver or shaft has turned since t = 0 at each point; none if not given.",
+        shown="ANGLE",
+        example='"270 deg"',
+        unit="deg",
+    ),
 ]
 
 
@@ -162,7 +168,7 @@ def section(
     *,
     readings: Section = 400,
     settling: Dropped = 50,
-    at: At = 0.0,
+    at: At = None,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     progress: Progress = None,
@@ -206,7 +212,8 @@ def section(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     if state not in names:
         raise RequestError(unknown_name("state", state, names))
-    times = turn * (settling + at / 360.0 + np.arange(1, readings + 1))
+    angle = 0.0 if at is None else at
+    times = turn * (settling + angle / 360.0 + np.arange(1, readings + 1))
     with shown("taking points", progress):
         run = model.simulate(
             duration=float(times[-1]),
@@ -228,7 +235,7 @@ def section(
         names=names,
         units=tuple(info.unit for info in manifest.states),
         row=names.index(state),
-        angle=at,
+        angle=angle,
         states=run.x,
         phase=phase,
         period=period,
