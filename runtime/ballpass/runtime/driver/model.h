@@ -7,6 +7,9 @@
 
 #include <math.h>
 
+/* Vectors are passed between functions of one file alone: that another processor would pass them in other registers means nothing. */
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 #include "kernels.h"
 #ifdef BALLPASS_LOCATED
 #include "switches.h"
