@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -53,6 +54,7 @@ def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str,
     units : by name of a parameter, where it is read in another one than the usual
     """
     first = _first(manifest, values)
+    alike = Counter(info.description for info in manifest.parameters)
     rows = []
     for info in manifest.parameters:
         value = values[info.name]
@@ -62,7 +64,8 @@ def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str,
         rows.append(
             {
                 "name": info.name,
-                "words": info.description,
+                # of several bearings the same numbers have the same words
+                "words": info.description if alike[info.description] == 1 else f"{info.description} ({info.name})",
                 "unit": "" if unit == "1" else unit,
                 "factor": 1.0 if unit == "1" else parse_quantity(f"1 {unit}", info.unit),
                 "value": value,
