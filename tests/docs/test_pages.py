@@ -26,6 +26,7 @@ import pytest
 from ballpass.derive import generate
 from ballpass.derive.scene.units import looked_up_size
 from ballpass.runtime import BallpassError, load
+from ballpass.runtime.ask.measured import read_trial
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.units import unit_size
 
@@ -57,6 +58,7 @@ NOT_READ = {
     '"6 mm"': "quantities, which a test below reads",
     "bearing.clearance\n": "names, which a test below looks up",
     "        y (up)": "a drawing",
+    "quantity,value": "a table of measurements, which a test below reads",
 }
 
 Block = tuple[str, str, int]
@@ -184,7 +186,19 @@ def test_blocks_are_of_kinds_that_are_run_or_read() -> None:
             if kind == "toml":
                 tomllib.loads(text)
             elif kind not in ("console", "python") and not kind.startswith("{"):
-                assert any(text.startswith(begin) for begin in NOT_READ), f"{page}: nobody checks\n{text}"
+                assert any(text.startswith((begin, f"  {begin}")) for begin in NOT_READ), (
+                    f"{page}: nobody checks\n{text}"
+                )
+
+
+def test_the_table_of_quantities_of_the_page_on_fits_is_read(tmp_path: Path) -> None:
+    page = (ROOT / "docs/howto/fit.md").read_text(encoding="utf-8")
+    (table,) = (text for kind, text in FENCE.findall(page) if kind == "text")
+    (tmp_path / "lines.csv").write_text("\n".join(line.strip() for line in table.splitlines()), encoding="utf-8")
+    manifest = read_manifest(ROOT / "generated/punching_press")
+    (given,) = read_trial(manifest, tmp_path / "lines.csv", {}, 1).quantities
+    assert given.names == ("amplitude:inner.y@1x", "amplitude:inner.y@bpfo", "peak_ball_force")
+    assert (given.values.tolist(), given.sizes.tolist()) == ([1.72e-6, 1.1e-7, 68.0], [2e-8, 1e-8, 2.0])
 
 
 def test_code_of_pages_fits_its_column() -> None:
