@@ -81,7 +81,8 @@ def _summary(result: Result) -> list[str]:
         "## What to take from it",
         "",
         f"At an error of {level_words(level)}: milliseconds of ballpass's stepper; how many times as long others take.",
-        "The columns are three damping laws, from stiff to light.",
+        "The columns are three dampings of the contacts, from stiff to light: the paper's number read in SI; the same",
+        "read in mm, as in `scenes/punching_press.toml`; that of `scenes/punching_press_tangent.toml`.",
         "",
         *table(["", *(case["words"] for case, _ in cases)], rows),
     ]
