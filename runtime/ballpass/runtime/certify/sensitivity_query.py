@@ -73,7 +73,7 @@ class Query:
     of, wrt : names, in `wrt` shell-style patterns too; None for the sensible ones, and for all parameters
     request : how long to run
     method : of the derivatives: ``auto`` or one of the stepper's
-    check : True (differences), False, or one of `CHECKS`
+    check : whether each derivative is compared with differences
     rtol, sensitivity_rtol : tolerances of states and derivatives
     kinks : what the steps do at the kinks of the laws; None locates them
     agreement : relative disagreement that is allowed [1]
@@ -137,8 +137,6 @@ def make_query(
             )
     if agreement is not None and not 0.0 < real(agreement) < 1.0:
         raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
-    if not isinstance(check, bool):
-        raise RequestError(f"check: True or False is expected, not {check!r}: differences are the second route.")
     return Query(
         of=[of] if isinstance(of, str) else of,
         wrt=[wrt] if isinstance(wrt, str) else wrt,
