@@ -1,6 +1,6 @@
 """Standard streams made usable for a command: encodings, streams that are closed or full.
 
-Messages that nobody takes are lost, and the command works on; results that cannot be written are a fault.
+Messages that no stream takes are lost, and the command works on; results that cannot be written are a fault.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ ALIGN = 5
 #: Batches of readings, whose means are taken for independent, and confidence of the interval.
 BATCHES, CONFIDENCE = 10, 0.95
 
-#: Longest period that is told from none, in readings.
+#: Longest period that is recognized, in readings.
 LONGEST = 16
 
 #: Readings that repeat, in shares of the magnitudes [1].

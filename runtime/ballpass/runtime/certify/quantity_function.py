@@ -302,8 +302,8 @@ class QuantityFunction:
         able = np.flatnonzero(finite | (self._failed == "raise"))
         if self._failed == "nan" and len(able) < len(rows):
             row = rows[np.flatnonzero(~finite)[0]]
-            told = [(name, row, "a parameter is no finite number") for name in self.of]
-            self._warn(UnknownValueWarning, told, "input")
+            unknown = [(name, row, "a parameter is no finite number") for name in self.of]
+            self._warn(UnknownValueWarning, unknown, "input")
         return rows, able, given.shape[:-1]
 
     def _numbers(self, row: Array) -> Numbers:
@@ -387,10 +387,10 @@ class QuantityFunction:
         self._free[of].append(along)
         return found.estimates
 
-    def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]], cause: str = "run") -> None:
+    def _warn(self, kind: type[BallpassWarning], unknown: Sequence[tuple[str, Array, str]], cause: str = "run") -> None:
         """Warn, once for each quantity and cause: wrong input must not silence what a run says."""
         fresh: dict[str, list[str]] = {}
-        for name, row, words in told:
+        for name, row, words in unknown:
             if (kind, cause, name) not in self._said:
                 self._said.add((kind, cause, name))
                 fresh.setdefault(f"{words} ({self._told(row)})", []).append(name)

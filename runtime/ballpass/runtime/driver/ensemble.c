@@ -145,7 +145,7 @@ static void leave_lane(const bp_job *job, bp_lane_block *b, int lane, int status
     at->t = b->t[lane];
     at->step = b->step[lane];
     at->log_error = b->log_error[lane];
-    /* an idle lane goes on with numbers that do no harm */
+    /* an idle lane continues with numbers that do no harm */
     b->active[lane] = b->reducing[lane] = b->t[lane] = b->small[lane] = b->changing[lane] = 0.0;
     b->length[lane] = 1.0;
     b->step[lane] = 1e-9;

@@ -20,7 +20,7 @@ typedef struct {
     int resume;               /* nonzero: go on behind an earlier call with the same x, reductions, work and results */
     const long *max_steps;    /* of each member, accepted and rejected, in all its calls */
     const volatile int *stop; /* the call ends soon after this becomes nonzero; or NULL */
-    volatile double *reached; /* how far each member has come, told now and then while the call is under way [s]; or NULL */
+    volatile double *reached; /* how far each member has come, written now and then while the call is under way [s]; or NULL */
 } ballpass_ensemble_options;
 
 /* Integrate members from x to the ends of their last segments.
@@ -33,11 +33,11 @@ typedef struct {
    first        first segment of each member, [members + 1]
    times        ends of the segments, [segments + 1] values a member: those of member m start at first[m] + m [s]
    inputs       u of each segment
-   restarts     1 where the load jumps at the segment's start; of a member's first segment in a call that goes on, against the last one of
+   restarts     1 where the load jumps at the segment's start; of a member's first segment in a call that continues, against the last one of
                 the call before
    reductions   rows of ballpass_reduction_size() numbers, head filled in (see reductions.h), or NULL
    work         ballpass_ensemble_work(members) bytes, aligned for double
-   results      one for each member; `written` is not used.  In a call that goes on, counts are added to, and members that ended otherwise
+   results      one for each member; `written` is not used.  In a call that continues, counts are added to, and members that ended otherwise
                 than done stay as they are, and so do those without segments in this call */
 BALLPASS_EXPORT int ballpass_ensemble(const ballpass_ensemble_options *options, long members, const double *p, const double *c,
                                     const double *tolerance, double *x, const long *first, const double *times, const double *inputs,

@@ -1,7 +1,7 @@
 /* When `auto` switches between explicit and linearly implicit steps within a segment, in single runs and ensembles.
 
    An explicit method is left where its steps are as long as stability allows: by the Jacobian, for how far steps reach into a fast
-   oscillation of little damping tells the states' differences badly.  A linearly implicit one then shows what its steps are worth.  At
+   oscillation of little damping estimates the states' differences badly.  A linearly implicit one then shows what its steps are worth.  At
    the limit the explicit method has excited the oscillation to about the tolerance, and it takes some fifty steps to damp that; then they
    may be hundreds of times as long.  Where they are not, the explicit one comes back and rests, each time twice as long.  See control.h
    for the family a segment starts with. */
@@ -16,7 +16,7 @@ static inline const bp_stability *bp_stability_of(int method) { return &bp_metho
 
 /* What a segment has shown about the families so far. */
 typedef struct {
-    double reach, size, longest; /* of the steps looked at: sums of their reaches [1] and sizes [s], the longest [s] */
+    double reach, size, longest; /* of the steps examined: sums of their reaches [1] and sizes [s], the longest [s] */
     double mean_reach, mean_size; /* at the last decision about an explicit method */
     double stable; /* step at which an explicit method is at its limit, where the last look was at a linearly implicit one [s] */
     int looks, stiff;
@@ -33,10 +33,10 @@ typedef struct {
     double gain;        /* how many times as long the longest linearly implicit one was since [1] */
 } bp_seen;
 
-/* Whether an accepted step is looked at: every so many, and each while an explicit method is at its limit. */
+/* Whether an accepted step is examined: every so many, and each while an explicit method is at its limit. */
 static inline int bp_family_looks(bp_family *family) { return family->stiff > 0 || family->steps++ % BP_STIFF_LOOK == 0; }
 
-/* Count a step looked at; whether there have been enough to decide on. */
+/* Count a step examined; whether there have been enough to decide on. */
 static inline int bp_family_decides(bp_family *family, double reach, double h)
 {
     family->reach += reach;
@@ -127,7 +127,7 @@ static inline int bp_after_linear(bp_family *family, bp_seen *seen, int method, 
 /* The largest stable step within these limits where a run's step started [s]. */
 typedef double bp_stable(void *run, const bp_stability *limit);
 
-/* The method for the next step, from an accepted one of size h that is looked at; `reach`: of an explicit method. */
+/* The method for the next step, from an accepted one of size h that is examined; `reach`: of an explicit method. */
 static inline int bp_judge_family(bp_family *family, bp_seen *seen, int method, int high_order, double h, double reach, bp_stable *stable,
                                   void *run)
 {

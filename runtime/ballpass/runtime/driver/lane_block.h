@@ -45,7 +45,7 @@ typedef struct {
     double small[BP_L] BP_ALIGNED, reducing[BP_L] BP_ALIGNED, changing[BP_L] BP_ALIGNED; /* changing: the method to change to */
     double steps[BP_L] BP_ALIGNED, rejected[BP_L] BP_ALIGNED, pivoted[BP_L] BP_ALIGNED; /* since the member entered its lane */
     double allowed[BP_L] BP_ALIGNED; /* steps, accepted and rejected */
-    /* what bp_family_looks looks at: steps until the next look, and whether all are looked at */
+    /* what bp_family_looks takes: steps until the next examination, and whether all are examined */
     double until_look[BP_L] BP_ALIGNED, at_limit[BP_L] BP_ALIGNED;
     bp_lane_explicit plain;
     bp_lane_linear linear;

@@ -4,7 +4,7 @@
 
 #include "lane_block.h"
 
-/* When the member in a lane is looked at next. */
+/* When the member in a lane is examined next. */
 static void tell_looks(const bp_member *at, bp_lane_block *b, int lane)
 {
     b->until_look[lane] = (double)((BP_STIFF_LOOK - at->family.steps % BP_STIFF_LOOK) % BP_STIFF_LOOK);
@@ -47,7 +47,7 @@ static double lane_stable_step(void *from, const bp_stability *limit)
     return bp_stable_step(work.A, work.B, limit);
 }
 
-/* Ask the rule of families about the lanes in which a step is to be looked at. */
+/* Ask the rule of families about the lanes in which a step is to be examined. */
 static void look(const bp_job *job, bp_lane_block *b, const double *looking)
 {
     double reach[BP_L] BP_ALIGNED = {0.0};
@@ -97,7 +97,7 @@ static void judge(const bp_job *job, bp_lane_block *b, int changeable)
     double looking[BP_L] BP_ALIGNED;
     int any = 0;
     BP_EACH_LANE {
-        /* bp_family_looks, for all lanes: steps are not counted while all are looked at */
+        /* bp_family_looks, for all lanes: steps are not counted while all are examined */
         const double due = b->until_look[lane] == 0.0 || b->at_limit[lane] != 0.0 ? b->accepted[lane] : 0.0;
         const double counted = b->at_limit[lane] == 0.0 ? b->accepted[lane] : 0.0;
         looking[lane] = due;

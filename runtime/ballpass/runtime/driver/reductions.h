@@ -1,13 +1,13 @@
 /* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
 
    Channels are the states, then for each bearing four quantities of its balls, each with its value of the most loaded ball: total force,
-   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of methods
+   elastic force, damping force, deflection.  Every step is evaluated at its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of methods
    whose dense output is of a degree above four, as two steps of half the size.
 
    Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
    all methods but these; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
 
-   Extremes: that polynomial is looked at for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
+   Extremes: that polynomial is searched for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
    evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all other
    methods the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
    an extrapolation across a kink.
@@ -202,7 +202,7 @@ typedef struct {
     const double (*balls)[BP_BALL_QUANTITIES]; /* of the balls, at the quarters */
 } bp_within;
 
-/* One channel within a step; `ball`, counted from 1, is the one looked at, 0: the most loaded ball, which is told then. */
+/* One channel within a step; `ball`, counted from 1, is the one evaluated, 0: the most loaded ball, which is set then. */
 static inline double bp_channel(const bp_within *step, double theta, int channel, int *ball)
 {
     double x[BP_NX], q[BP_BALL_QUANTITIES];

@@ -11,7 +11,7 @@
                 coordinate c there
    BP_STRETCHED where BP_NAME(position_term)(at, i, c) is added to the velocity of coordinate c there */
 
-/* Stages u of a step of size h from x; `solve`: column j tells what R[j] adds to kv. */
+/* Stages u of a step of size h from x; `solve`: column j is what R[j] adds to kv. */
 BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict method, const BP_NAME(linear) *at,
                                           const double *restrict solve, double u[][BP_NX * BP_W], const double *restrict x,
                                           const double *restrict step)

@@ -62,7 +62,7 @@ typedef struct {
     bp_seen seen;
     double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
     int method;
-    /* within the segment, of a run that goes on in another call */
+    /* within the segment, of a run that continues in another call */
     double elapsed; /* [s] */
     int rejected_last;
     bp_family family;

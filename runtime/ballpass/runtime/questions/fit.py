@@ -290,9 +290,9 @@ class FitAnswer(ShortRepr, Reported):
             said.append(f"{len(self.starts)} starts ended at mean squares of differences over noise of {ends}")
         warned = []
         if self.rivals:
-            told = "; ".join(", ".join(f"{value:.6g}" for value in rival) for rival in self.rivals)
+            listed = "; ".join(", ".join(f"{value:.6g}" for value in rival) for rival in self.rivals)
             warned.append(
-                f"Other values fit as well within the noise, SI: {told}. The intervals do not reach to them. Give "
+                f"Other values fit as well within the noise, SI: {listed}. The intervals do not reach to them. Give "
                 "narrower bounds, more data, or a part of the record that depends less on its start."
             )
         warned += [
@@ -443,8 +443,8 @@ def fit(
     with kept_parts(keep, model, *decides) as misfit.parts, shown("fitting", progress) as tell:
         for k in range(starts):
             begun = best_of(misfit, shares[CANDIDATES * k : CANDIDATES * (k + 1)])
-            told = None if tell is None else lambda done, k=k: tell((k + done) / starts)
-            found.append((begun, fit_unknowns(misfit, begun, loss, told)))
+            report = None if tell is None else lambda done, k=k: tell((k + done) / starts)
+            found.append((begun, fit_unknowns(misfit, begun, loss, report)))
         # all in the noise of the best, for their noises differ
         best = min((one for _, one in found), key=lambda one: float(np.sum(np.log(one.noise))))
         _refuse_chaos(model, misfit, best)

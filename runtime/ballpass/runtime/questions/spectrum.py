@@ -180,7 +180,7 @@ class SignalSpectrum(ShortRepr, Reported):
         height = f"{self.scaling} [{self.height_unit}]"
         table = ReportTable(
             title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
-            heads=(across, height, "line", "or (told apart by)")[:columns],
+            heads=(across, height, "line", "or (separated by)")[:columns],
             rows=[
                 (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name, others)[:columns]
                 for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
@@ -427,7 +427,7 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 
 
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
-    """Turns of a run that tells ball pass from the shaft; None where a table gives the speed or nothing turns."""
+    """Turns of a run that separates ball pass from the shaft; None where a table gives the speed or nothing turns."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
     from ballpass.runtime.run.driver_angle import period
 

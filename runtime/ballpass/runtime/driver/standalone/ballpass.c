@@ -80,7 +80,7 @@ static void clear(ballpass *s)
     s->faults.text[0] = '\0';
 }
 
-static int told(const ballpass *s, int answer) { return s->faults.count ? answer : BALLPASS_OK; }
+static int answer_of(const ballpass *s, int answer) { return s->faults.count ? answer : BALLPASS_OK; }
 
 static int refuse(ballpass *s, const char *what, const char *given, const char *allowed)
 {
@@ -331,7 +331,7 @@ int ballpass_check_bounds(ballpass *s)
                   scene_parameters[rule->parameter].name, values[rule->parameter], rule->factor, scene_parameters[rule->other].name, least,
                   scene_parameters[rule->parameter].unit);
     }
-    return told(s, BALLPASS_REFUSED);
+    return answer_of(s, BALLPASS_REFUSED);
 }
 
 void ballpass_stop(ballpass *s) { s->run.started = 0; }
@@ -447,7 +447,7 @@ static int must_run(ballpass *s)
     clear(s);
     if (!s->run.started) add_fault(&s->faults, "the run has not been started. Allowed: ballpass_start first.");
     else if (s->run.failed) add_fault(&s->faults, "the run has failed. Allowed: to start it again, or to restore a state.");
-    return told(s, BALLPASS_REFUSED);
+    return answer_of(s, BALLPASS_REFUSED);
 }
 
 /* Segments and constants follow values that were set. */
