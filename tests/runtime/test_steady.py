@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,75 @@ def test_a_turn_is_a_period_of_the_press_whose_cage_makes_three_eighths(make_mod
     assert found.stable
     run = press.simulate(cycles=6, parameters=THREE_EIGHTHS, outputs=[], rtol=1e-10)
     assert run.x[-1] == pytest.approx(found.start, abs=1e-9)
+
+
+def openings_and_closings(
+    model: Model, parameters: dict[str, float], start: np.ndarray, period: float
+) -> list[tuple[int, int, bool]]:
+    """Sample, ball, and whether it closes: where the ball forces of a plain run become zero or cease to be."""
+    t = np.linspace(0.0, period, 100_001)
+    run = model.simulate(
+        times=t,
+        duration=period,
+        initial=start,
+        parameters=parameters,
+        outputs=["ball.force"],
+        transient=0.0,
+        rtol=1e-10,
+    )
+    loaded = run["ball.force"] > 0.0
+    rows, balls = np.nonzero(loaded[1:] != loaded[:-1])
+    return [(int(k), int(ball) + 1, bool(loaded[k + 1, ball])) for k, ball in zip(rows, balls, strict=True)]
+
+
+@pytest.mark.long
+def test_the_contacts_of_the_press_are_those_of_its_sampled_ball_forces(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press_tangent")
+    found = press.steady(parameters=THREE_EIGHTHS)
+    seen = openings_and_closings(press, THREE_EIGHTHS, found.start, found.period)
+    assert found.contacts.count == len(seen) > 100
+    # damping ends the force shortly before the contact opens: the order is compared where contacts close
+    moments = [(moment, ball) for moment, ball, closes in seen if closes]
+    order = [int(one.split()[0]) for one in found.contacts.order if "closes" in one]
+    # the signature begins elsewhere in the sequence; what comes a period later is renumbered by three
+    every = [(moment + 100_000 * turn, (ball - 1 - 3 * turn) % 8 + 1) for turn in range(9) for moment, ball in moments]
+    one_after_other = [ball for _, ball in every]
+    together = {k for k, (one, other) in enumerate(pairwise(every)) if one[0] == other[0]}
+    assert len(together) < 20  # those whose order samples do not say
+
+    def same(first: int) -> bool:
+        wrong = [k for k, ball in enumerate(order, first) if one_after_other[k] != ball]
+        return all(k in together or k - 1 in together for k in wrong)
+
+    assert any(same(first) for first in range(8 * len(moments)))
+
+
+@pytest.mark.parametrize(
+    ("over", "parameters", "added", "warned"),
+    [
+        ("shaft.speed=6000 rpm:5850 rpm", {"bearing.clearance": 2e-6}, 2, True),  # a ball touches once more
+        ("bearing.clearance=5.62 um:5.68 um", {}, 0, False),  # one parts before another touches, instead of after
+    ],
+)
+def test_contacts_change_on_a_branch_as_runs_on_both_sides_say(
+    rotor: Model, over: str, parameters: dict[str, float], added: int, warned: bool
+) -> None:
+    found = rotor.steady(over=over, transient=20.0, parameters=parameters)
+    assert found.over is not None
+    (branch,) = found.branches
+    ((one, other),) = branch.contact_changes
+    for point in (one, other):
+        given = {**parameters, found.over.name: point.value}
+        period = PERIOD * rotor.parameters["shaft.speed"] / given.get("shaft.speed", rotor.parameters["shaft.speed"])
+        seen = openings_and_closings(rotor, given, point.nodes[0], period)
+        assert point.contacts.count == len(seen)
+    assert other.contacts.count - one.contacts.count == added
+    assert one.contacts.grazes == other.contacts.grazes == warned
+    report = found.report()
+    (event,) = report.facts["branches"][0]["events"]
+    assert event["between"] == [one.value, other.value]
+    assert "contacts change" in str(found)
+    assert any("Do not trust Newton's iteration" in words for words in report.warnings) == warned
 
 
 @pytest.mark.long

@@ -10,6 +10,8 @@ two points, the point between them is found by Brent's method along the step:
 * branch point: a multiplier passes 1 and the parameter goes on;
 * period doubling: a multiplier passes -1;
 * Neimark-Sacker: a pair of complex multipliers passes the unit circle.
+
+Every point carries its contact signature; where that of the next one differs, contacts change between the two.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
+from ballpass.runtime.ask.contact_sequence import ContactSequence, contact_sequence
 from ballpass.runtime.ask.shooting import PeriodicState, Residual, Shooting
 from ballpass.runtime.contract.errors import SimulationError
 
@@ -55,6 +58,7 @@ class BranchPoint:
     multipliers : largest first, shape (states,)
     kind : what changes here, one of `KINDS`; "" where nothing does
     tangent : of the branch there, in shares of magnitudes and range
+    contacts : which elements touch, in which order, within a period
     """
 
     value: float
@@ -62,6 +66,7 @@ class BranchPoint:
     multipliers: np.ndarray
     kind: str
     tangent: np.ndarray
+    contacts: ContactSequence
 
     @property
     def stable(self) -> bool:
@@ -86,6 +91,12 @@ class SteadyBranch:
     @property
     def special(self) -> tuple[BranchPoint, ...]:
         return tuple(point for point in self.points if point.kind)
+
+    @property
+    def contact_changes(self) -> tuple[tuple[BranchPoint, BranchPoint], ...]:
+        """Neighbouring points between which the contact signature changes."""
+        pairs = zip(self.points, self.points[1:], strict=False)
+        return tuple((one, other) for one, other in pairs if not one.contacts.same(other.contacts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +248,14 @@ class _Path:
         nodes, value = self.states(found.y)
         multipliers = np.linalg.eigvals(found.residual.monodromy)
         order = np.argsort(-np.abs(multipliers), kind="stable")
-        return BranchPoint(value=value, nodes=nodes, multipliers=multipliers[order], kind=kind, tangent=found.tangent)
+        return BranchPoint(
+            value=value,
+            nodes=nodes,
+            multipliers=multipliers[order],
+            kind=kind,
+            tangent=found.tangent,
+            contacts=contact_sequence(self.shooting, nodes, value),
+        )
 
 
 def _turned(found: _Found) -> _Found:

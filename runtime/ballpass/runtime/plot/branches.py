@@ -51,9 +51,13 @@ def draw_branches(branches: Sequence[SteadyBranch], over: ParameterRange, state:
             above.plot(
                 point.value / over.factor, point.nodes[0, 0], _MARKERS[point.kind], color=INK, markersize=5, zorder=5
             )
+        for point in (point for pair in branch.contact_changes for point in pair):
+            above.plot(point.value / over.factor, point.nodes[0, 0], "|", color=GREY, markersize=9)
     for kind, marker in _MARKERS.items():
         if any(point.kind == kind for branch in branches for point in branch.points):
             above.plot([], [], marker, color=INK, markersize=5, label=kind)
+    if any(branch.contact_changes for branch in branches):
+        above.plot([], [], "|", color=GREY, markersize=9, label="contacts change")
     below.axhline(1.0, color=GREY, linewidth=1.0)
     above.set_ylabel(label(f"{state} at t = 0", state_unit))
     below.set_ylabel(label("largest multiplier, magnitude", "1"))

@@ -20,6 +20,7 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ballpass.runtime.ask.contact_sequence import ContactSequence
     from ballpass.runtime.ask.continuation import SteadyBranch
     from ballpass.runtime.ask.forcing_period import ForcingPeriod
     from ballpass.runtime.ask.parameter_range import ParameterRange
@@ -31,9 +32,6 @@ SAME = 1e-3
 
 #: A state repeats sooner where that changes it by less, in shares of the magnitudes [1].
 REPEATS = 1e-6
-
-#: A multiplier is on the unit circle within this [1].
-ON_CIRCLE = 1e-6
 
 #: Segments where one fails; kicks along the direction that doubles the period, in shares of the magnitudes.
 SEGMENTS, KICKS = 8, (1e-3, 1e-2, 0.03, 0.1, 0.3)
@@ -90,6 +88,7 @@ class SteadyState(ShortRepr, Reported):
     start : state at t = 0, shape (states,)
     multipliers : eigenvalues of the derivative of the state after a period by that at the start, largest first
     resolution : size below which a multiplier is not known from zero
+    contacts : which elements touch, in which order, within a period
     left : what a period changed before each iteration and after the last one, in shares of the states' magnitudes [1]
     segments : of multiple shooting
     integrated : periods that the iterations integrated, with tangents
@@ -116,6 +115,7 @@ class SteadyState(ShortRepr, Reported):
     start: np.ndarray
     multipliers: np.ndarray
     resolution: float
+    contacts: ContactSequence
     left: tuple[float, ...]
     segments: int
     integrated: int
@@ -144,9 +144,22 @@ class SteadyState(ShortRepr, Reported):
         >>> model.steady(parameters={"bearing.pitch_diameter": 31.75e-3}).kind
         'stable'
         """
+        from ballpass.runtime.ask.steady_report import kind_of
+
         return kind_of(self.multipliers)
 
     def _report(self) -> Report:
+        from ballpass.runtime.ask.steady_report import (
+            branch_facts,
+            branch_table,
+            branch_words,
+            complex_facts,
+            complex_words,
+            contact_facts,
+            contact_words,
+            grazing_warnings,
+        )
+
         rows = [
             {"state": name, "unit": unit, "start": start}
             for name, unit, start in zip(self.states, self.units, self.start.tolist(), strict=True)
@@ -160,24 +173,24 @@ class SteadyState(ShortRepr, Reported):
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
         lost = len(self.multipliers) - len(known)
-        told = ", ".join(_complex(m) for m in known if m.imag >= 0.0)
+        told = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
         told += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
         parts: list[str | ReportTable] = [
             f"{self.forcing}.",
             table,
             f"multipliers: {told}",
+            contact_words(self.contacts),
             f"{self.kind}; Newton's iteration left {', '.join(f'{left:.1e}' for left in self.left)} of the magnitudes; "
             f"{self.integrated} periods integrated, in {self.segments} segment{'s' if self.segments > 1 else ''}",
         ]
         if self.sooner < self.repeats:
             parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")
         if self.over is not None:
-            parts.append(self._points(self.over))
-            parts += [
-                f"branch of period {branch.repeats}: {len(branch.points)} points, ends {branch.ended}"
-                for branch in self.branches
-            ]
+            parts.append(branch_table(self.branches, self.over))
+            parts += [branch_words(branch) for branch in self.branches]
         warnings = [*self.notes]
+        if self.over is not None:
+            warnings += [words for branch in self.branches for words in grazing_warnings(branch, self.over)]
         if self.difference > SAME:
             warnings.append(
                 f"{self.turns:g} turns are no period of this machine: at one state the accelerations at both ends "
@@ -190,83 +203,20 @@ class SteadyState(ShortRepr, Reported):
             "repeats": self.repeats,
             "sooner": self.sooner,
             "states": rows,
-            "multipliers": [_plain(m) for m in self.multipliers.tolist()],
+            "multipliers": [complex_facts(m) for m in self.multipliers.tolist()],
             "resolution": self.resolution,
             "stable": self.stable,
             "kind": self.kind,
+            "contacts": contact_facts(self.contacts),
             "left": list(self.left),
             "segments": self.segments,
             "integrated": self.integrated,
             "difference": self.difference,
             "over": self.over.name if self.over else None,
             "over_unit": self.over.unit if self.over else None,
-            "branches": [
-                {
-                    "repeats": branch.repeats,
-                    "ended": branch.ended,
-                    "points": [
-                        {
-                            "value": point.value,
-                            "kind": point.kind,
-                            "stable": point.stable,
-                            "start": point.nodes[0].tolist(),
-                            "multipliers": [_plain(m) for m in point.multipliers.tolist()],
-                        }
-                        for point in branch.points
-                    ],
-                }
-                for branch in self.branches
-            ],
+            "branches": [branch_facts(branch) for branch in self.branches],
         }
         return Report(parts=parts, facts=facts, records=rows, index=("state",), warnings=warnings)
-
-    def _points(self, over: ParameterRange) -> ReportTable:
-        """Ends of the branches and the points at which the kind of the states changes."""
-        rows = []
-        for branch in self.branches:
-            ends = (branch.points[0], *branch.special, branch.points[-1])
-            for k, point in enumerate(ends):
-                what = point.kind or ("first point" if k == 0 else "last point")
-                rows.append(
-                    (
-                        str(branch.repeats),
-                        f"{point.value / over.factor:.9g}",
-                        what,
-                        _complex(complex(point.multipliers[0])),
-                    )
-                )
-        return ReportTable(
-            title=f"Branches over {over.name}",
-            heads=("period", f"value, {over.shown_unit}", "what", "largest multiplier"),
-            rows=rows,
-            right=("period", f"value, {over.shown_unit}", "largest multiplier"),
-        )
-
-
-def kind_of(multipliers: np.ndarray) -> str:
-    """Stability in words."""
-    out = [m for m in multipliers.tolist() if abs(m) > 1.0 + ON_CIRCLE]
-    on = [m for m in multipliers.tolist() if abs(abs(m) - 1.0) <= ON_CIRCLE]
-    if on:
-        names = {"fold or branch point": 1.0, "period doubling": -1.0}
-        near = [name for name, place in names.items() if any(abs(m - place) <= ON_CIRCLE for m in on)]
-        return f"at a bifurcation: {' and '.join(near) or 'Neimark-Sacker point'}"
-    if not out:
-        return "stable"
-    kinds = {
-        "a real multiplier above 1, as behind a fold": any(not m.imag and m.real > 0.0 for m in out),
-        "a real multiplier below -1, as behind a period doubling": any(not m.imag and m.real < 0.0 for m in out),
-        "a complex pair outside the unit circle, as behind a Neimark-Sacker point": any(m.imag for m in out),
-    }
-    return f"unstable: {'; '.join(words for words, holds in kinds.items() if holds)}"
-
-
-def _complex(m: complex) -> str:
-    return f"{m.real:.6g} ± {abs(m.imag):.6g} i (size {abs(m):.9g})" if m.imag else f"{m.real:.9g}"
-
-
-def _plain(m: complex) -> dict[str, float]:
-    return {"real": m.real, "imaginary": m.imag, "magnitude": abs(m)}
 
 
 def _figures(_model: AnyModel, found: SteadyState, _parameters: object) -> Iterator[tuple[str, Figure]]:
@@ -315,6 +265,7 @@ def steady(
     >>> found.states[0], found.start.shape
     ('inner.x', (8,))
     """
+    from ballpass.runtime.ask.contact_sequence import contact_sequence
     from ballpass.runtime.ask.forcing_period import forcing_period
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
@@ -367,6 +318,7 @@ def steady(
         start=found.nodes[0],
         multipliers=found.multipliers,
         resolution=SENSITIVITY * sampled.statistics.rtol,
+        contacts=contact_sequence(shooting, found.nodes, given[ends.name] if ends else None),
         left=found.left,
         segments=shooting.segments,
         integrated=found.periods,
