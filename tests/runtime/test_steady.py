@@ -60,6 +60,33 @@ def test_multipliers_are_those_of_differences_of_a_tight_flow(rotor: Model) -> N
         assert np.min(np.abs(differences - m)) < 1e-6
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("law", ["one-sided-gated", "two-sided-gated"])
+def test_multipliers_of_a_law_that_jumps_are_those_of_differences_of_a_tight_flow(
+    make_model: Callable[..., Model], law: str
+) -> None:
+    damped = ('law = "none"', f'law = "{law}"\ncoefficient = "400 N*s/m"')
+    rotor = make_model("varying_compliance", damped)
+    given = {"bearing.clearance": 2e-6, "shaft.speed": 5870.0 * RPM, "bearing.inner_ring.damping": 100.0}
+    found = rotor.steady(transient=20.0, parameters=given)
+    assert found.contacts.count >= 2
+    columns = []
+    for k, step in enumerate([1e-10, 1e-10, 3e-8, 3e-8]):
+        ends = []
+        for side in (1.0, -1.0, 0.5, -0.5):
+            start = found.start.copy()
+            start[k] += side * step
+            run = rotor.simulate(
+                duration=found.period, initial=start, parameters=given, rtol=1e-12, outputs=[], kinks="located"
+            )
+            ends.append(run.x[-1])
+        rough, fine = (ends[0] - ends[1]) / (2.0 * step), (ends[2] - ends[3]) / step
+        columns.append((4.0 * fine - rough) / 3.0)
+    differences = np.linalg.eigvals(np.column_stack(columns))
+    for m in found.multipliers:
+        assert np.min(np.abs(differences - m)) < 1e-5
+
+
 def test_states_in_one_and_in_several_segments_are_the_same(rotor: Model) -> None:
     one, several = rotor.steady(), rotor.steady(segments=5)
     assert several.segments == 5

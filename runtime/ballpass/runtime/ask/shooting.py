@@ -139,7 +139,7 @@ class Shooting:
                 outputs=[],
                 rtol=self.rtol if rtol is None else rtol,
             )
-            found = sensitivities(model, numbers, request, names)
+            found = sensitivities(model, numbers, request, names, with_jumps=True)
             end, slopes = found.solution.x[-1], found.x[-1]
             flow, nxt = slopes[:, :count], (k + 1) % self.segments
             left[k] = (end - nodes[nxt]) / self.magnitude

@@ -253,8 +253,7 @@ def steady(
     Raises
     ------
     RequestError
-        A scene without states, one whose driver's motion is a state, one in which what turns has no common period, or
-        a law whose force jumps.
+        A scene without states, one whose driver's motion is a state, or one in which what turns has no common period.
     SimulationError
         Newton's iteration does not converge, or the computation failed.
 
@@ -270,13 +269,11 @@ def steady(
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
-    from ballpass.runtime.run.locating import refuse_jumps
 
     manifest = model.manifest
     if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
         why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
         raise RequestError(f"steady: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
-    refuse_jumps(manifest, "steady")
     _ = model.stepper  # refused here where a scene has none
     ends = None if over is None else parameter_range(manifest, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}

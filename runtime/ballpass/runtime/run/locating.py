@@ -133,10 +133,16 @@ def stepper_for(model: LoadedModel, kinks: Kinks, *, derivatives: bool = False) 
     return model.locating_stepper if located else model.stepper
 
 
+def jumping_laws(manifest: Manifest) -> list[str]:
+    """Laws whose force jumps at contact.
+
+    Loads that jump at the edges of windows are none: steps end there, and the derivative's jump is known.
+    """
+    return [law for law, word in manifest.smoothness if word == "discontinuous" and not law.startswith("gate.")]
+
+
 def refuse_jumps(manifest: Manifest, what: str) -> None:
     """Refuse derivatives of a motion with laws whose force jumps at contact.
-
-    Loads that jump at the edges of windows are no reason: steps end there, and the derivative's jump is known.
 
     Parameters
     ----------
@@ -147,7 +153,7 @@ def refuse_jumps(manifest: Manifest, what: str) -> None:
     RequestError
         Names the laws.
     """
-    jumping = [law for law, word in manifest.smoothness if word == "discontinuous" and not law.startswith("gate.")]
+    jumping = jumping_laws(manifest)
     if jumping:
         raise RequestError(
             f"{what}: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "

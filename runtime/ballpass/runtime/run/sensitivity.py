@@ -17,11 +17,14 @@ from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.locating import kinks_with_derivatives, refuse_jumps
+from ballpass.runtime.run.locating import jumping_laws, kinks_with_derivatives, refuse_jumps
 from ballpass.runtime.run.request import Request, tolerance
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.short import ShortRepr
+
+#: Method of runs with derivatives where laws jump.
+EXPLICIT = "stepper-dop853"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -63,8 +66,15 @@ class Sensitivities(ShortRepr):
         return np.asarray(self.x[:, states.index(state), self.names.index(parameter)])
 
 
-def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names: Sequence[str]) -> Sensitivities:
+def sensitivities(
+    model: LoadedModel, numbers: Numbers, request: Request, names: Sequence[str], *, with_jumps: bool = False
+) -> Sensitivities:
     """Run a model with its derivatives along parameters.
+
+    Parameters
+    ----------
+    with_jumps : take laws whose force jumps at contact, by `EXPLICIT`: the time of each contact moves with the
+        derivatives, so that they jump with the force (saltation); those of linearly implicit steps do not
 
     Raises
     ------
@@ -74,7 +84,10 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
         The computation failed.
     """
     kinks = kinks_with_derivatives(request.kinks, model.manifest)
-    refuse_jumps(model.manifest, "sensitivities")
+    if not with_jumps:
+        refuse_jumps(model.manifest, "sensitivities")
+    elif jumping_laws(model.manifest):
+        request = replace(request, method=EXPLICIT)
     method = request.method or model.manifest.run.method
     if method not in ("auto", *STEPPERS):
         raise RequestError(
