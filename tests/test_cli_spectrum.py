@@ -54,6 +54,7 @@ def test_tables_name_the_lines_in_frequencies_orders_and_envelopes(
         assert done.exit_code == 0, done.output
         assert ("BPFO 3.05224" if "--orders" in words else "BPFO 152.612") in done.stdout
         assert "crest factor" in done.stdout
+        assert ("envelope of 2000 to 8000 Hz" in done.stdout) == ("--envelope" in words)
         place, _, names = done.stdout.rpartition("results in ")[2].strip().partition(": ")
         assert all((Path(place) / name).is_file() for name in names.split(", "))
 

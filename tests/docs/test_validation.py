@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scripts.validation import cage_lag, classifier, lines, spall_lines
+from scripts.validation import cage_lag, classifier, lines, load_zone, spall_lines
+
+from ballpass.runtime.ask.vibration import diagnosis
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "validation"
-SCRIPTS = ("spall_lines", "cage_lag", "lives", "motions", "classifier")
+SCRIPTS = ("spall_lines", "load_zone", "cage_lag", "lives", "motions", "classifier")
 
 
 def text(name: str) -> str:
@@ -71,6 +73,26 @@ def test_lines_of_a_spall_stand_higher_than_those_of_the_other_ring() -> None:
     for one in seconds:
         outer, inner = one.features[0], one.features[2]
         assert (outer > inner) == (one.label == "outer")
+
+
+def test_kurtosis_of_recordings_at_6_and_12_o_clock_is_alike_and_that_at_3_is_half() -> None:
+    """At every load of the motor, though rms at 12 o'clock is the least and that at 3 o'clock the highest."""
+    rows = {(one.place, one.load): one for one in load_zone.measured(None)}
+    assert len(rows) == 12
+    for load in range(4):
+        six, three, twelve = (rows[place, load] for place in (6, 3, 12))
+        assert twelve.rms < 0.5 * six.rms < 0.5 * three.rms
+        assert twelve.kurtosis == pytest.approx(six.kurtosis, rel=0.11)
+        assert three.kurtosis == pytest.approx(0.53 * six.kurtosis, rel=0.06)
+
+
+def test_kurtosis_of_a_resonance_is_one_and_a_half_decays_between_hits() -> None:
+    """What the page explains the model's kurtosis by, whatever the height of the hits."""
+    rate, ball_pass, decay = 200e3, 100.0, 900.0
+    since = (np.arange(200000) / rate) % (1.0 / ball_pass)
+    for height in (0.3, 1.0):
+        ringing = height * np.exp(-decay * since) * np.sin(2.0 * np.pi * 3300.0 * since)
+        assert diagnosis(ringing).kurtosis == pytest.approx(1.5 * decay / ball_pass, rel=0.01)
 
 
 def test_lines_are_found_where_they_were_put() -> None:

@@ -197,9 +197,10 @@ class SignalSpectrum(ShortRepr, Reported):
             f"rms {s.rms:.4g} {self.unit}, peak {s.peak:.4g} {self.unit}, crest factor {s.crest_factor:.3g}, kurtosis "
             f"{s.kurtosis:.3g}, skewness {s.skewness:.3g}"
         )
-        if self.envelope is not None and self.kurtosis is not None:
+        if self.envelope is not None:
             low, high = self.envelope
-            said.append(f"envelope of {low:.5g} to {high:.5g} Hz, chosen by its kurtosis of {self.kurtosis:.3g}")
+            chosen = "" if self.kurtosis is None else f", chosen by its kurtosis of {self.kurtosis:.3g}"
+            said.append(f"envelope of {low:.5g} to {high:.5g} Hz{chosen}")
         facts = {
             "of": self.of,
             "unit": self.unit,
@@ -288,8 +289,6 @@ def spectrum(
     """The highest lines of a signal of the steady motion, each with its name: BPFO, BPFI, 2 BSF, FTF, the shaft.
 
     Without a length the run has as many turns as tell the ball pass from the shaft's multiples.
-
-    Without a number of turns the run takes as many as tell ball pass from the shaft.
 
     Parameters
     ----------
