@@ -142,6 +142,26 @@ def test_a_spall_of_the_outer_ring_is_met_at_the_ball_pass_order_of_the_momentar
     assert line / multiple == pytest.approx(order, rel=1e-3)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("drive", ["constant speed", "motor"])
+def test_passages_are_where_a_ball_is_at_an_edge_and_the_crank_at_that_of_a_window(drive: str, tmp_path: Path) -> None:
+    """Known before the run or decided by the motion: angles at these times, and as many times as balls went by."""
+    model = built(LINES[drive], tmp_path / "model")
+    options = {"duration": 0.4, "transient": 0.0, "rtol": 1e-9}
+    found = model.passages(**options)
+    assert [edge.rpartition(".")[2] for edge in found] == ["start", "end", "begin", "middle", "end"]
+    for edge, times in found.items():
+        assert np.all(np.diff(times) > 0.0)
+        at = {**model.parameters, **model.constants()}[edge]
+        name = "drive_angle" if drive == "constant speed" else "driver.angle"
+        run = model.simulate(times=np.concatenate([times, [0.4]]), outputs=["at_A.cage.in_outer", name], **options)
+        angle, count = (8 * run["at_A.cage.in_outer"], 8) if "defects" in edge else (run[name], 1)
+        assert np.angle(np.exp(1j * (angle[:-1] - at))) == pytest.approx(0.0, abs=1e-6)
+        turns = 0.4 * 500 / 60 if drive == "constant speed" else run["driver.angle"][-1] / (2 * np.pi)
+        passed = turns * (count * (1 - 7.9375 / 33.5) / 2 if count == 8 else 1)
+        assert abs(len(times) - passed) <= 1.0
+
+
 #: No edge has a step, which would give or take energy.
 COASTING_PRESS = press(bearing("B", "rod", law=UNDAMPED, effects=EFFECTS + SPALL), drive=COASTING)
 

@@ -25,6 +25,7 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
 from ballpass.runtime.point.run_start import Initial, start_of
+from ballpass.runtime.quantity.passages import passing_times
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.questions import Questions
 from ballpass.runtime.run.choose_method import method_names
@@ -400,6 +401,47 @@ class Model(PointModel, Questions):
         )
         with shown("simulating", progress) as tell:
             return quantity_values(self, numbers, replace(request, progress=tell), [of] if isinstance(of, str) else of)
+
+    def passages(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        rtol: float | None = None,
+        initial: Initial = None,
+        progress: Progress = None,
+    ) -> dict[str, np.ndarray]:
+        """Times at which loads in windows begin and end, and balls enter and leave spalls, by the edge [s].
+
+        An edge has the name of its parameter, or of its constant where it follows from others.  Each ball that passes
+        an edge of a spall gives a time; which ball it is, is not given.  Known times are exact, those that the motion
+        decides as exact as the run.  Parameters are those of `simulate`; times of the transient are left out.
+
+        Raises
+        ------
+        RequestError
+            A wrong request, or a linkage that cannot be assembled.
+        SimulationError
+            The computation failed.
+
+        Examples
+        --------
+        >>> found = model.passages(cycles=2, transient=0)
+        >>> found["mechanism.forces.punch.window.start"].round(4)  # [s]
+        array([0.079, 0.199])
+        """
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            rtol=rtol,
+            initial=self._start(numbers, initial),
+            transient_cycles=transient,
+        )
+        with shown("simulating", progress) as tell:
+            return passing_times(self, numbers, replace(request, progress=tell))
 
     def reduce(
         self,

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked, refuse_full_disk
@@ -258,9 +259,18 @@ def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _DataS
         drawn = draw(seed, kind, one.members, {**one.parameters, **noise})
         columns.append(drawn)
         defaults = {info.name: np.full(one.members, info.default) for info in one.model.manifest.parameters}
-        for text in unusual(one.model.manifest, defaults | drawn):
+        for text in (*unusual(one.model.manifest, defaults | drawn), *_without_entries(one.model.manifest)):
             warnings.warn(f"class {one.label}: {text}", UnusualWarning, stacklevel=3)
     return _DataSetTable(kinds=kinds[order], places=places[order], columns=tuple(columns))
+
+
+def _without_entries(manifest: Manifest) -> Iterator[str]:
+    """Sentences about spalls that balls enter at times that are not known before the run."""
+    for spall in dict.fromkeys(edge.rpartition(".")[0] for edge in manifest.edges if "defects." in edge):
+        yield (
+            f"the motion decides when a ball enters {spall}: the data set has no entry_time of it. Model.passages "
+            "gives the times of one run."
+        )
 
 
 def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: int, title: str) -> dict[str, Any]:

@@ -1,25 +1,31 @@
 """Moments at which angles that the motion decides pass edges of windows, and how these move with the parameters.
 
-In: a run along nodes.  Out: `Passages`.  A load begins or ends there, or a ball enters a spall or leaves it: rates of
-states jump, and so may outputs.
+In: a run along nodes.  Out: `Passages`; for users, `passing_times` of all edges of a run.  A load begins or ends there,
+or a ball enters a spall or leaves it: rates of states jump, and so may outputs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import APART, crossings
-from ballpass.runtime.quantity.nodes import Nodes
+from ballpass.runtime.quantity.nodes import Nodes, make_edges, place
+from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.loop import StepEnds, start_run
+from ballpass.runtime.run.request import Request, check_memory
+from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.segments import joined_segments, run_windows
 
 Array = NDArray[np.float64]
 
@@ -86,6 +92,40 @@ def find_passages(run: Run, track: Track) -> Passages:
         left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
         times = times + left / seen["rate"].value[rows, columns] - before
     return Passages(times=times, edges=tuple(edge for _, edge in found), columns=columns, near=10.0 * before)
+
+
+def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dict[str, Array]:
+    """Times at which a run passes edges of windows, by the edge, each increasing [s].
+
+    Those of loads and spalls, whether known before the run or decided by the motion; after the transient.
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or a run too long to keep its steps in memory.
+    SimulationError
+        The computation failed.
+    """
+    run = resolve(model, numbers, request).check_steady()
+    parts: dict[str, list[Array]] = {edge: [] for edge in model.manifest.edges}
+    for item in model.manifest.inputs:
+        if item.kind == "gate":
+            for edge, times in driver_angle.edge_times(item, numbers.values, run.start, run.end):
+                parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
+    if model.manifest.edges:
+        ends = StepEnds()
+        start_run(run, [ends]).go_on()
+        cuts, run = ends.all[:, 0], replace(run, progress=None)
+        check_memory("Edges along a run of", len(GAUSS) * len(cuts), 16 * len(model.states), "Run fewer cycles.")
+        windows = run_windows(model, numbers, (run.begin, run.end), run.turn, run.start)
+        (segments,) = joined_segments(windows, all_=True)
+        edges = make_edges(run, segments, None)
+        panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
+        passed = find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges)))
+        at = passed.times + BEFORE * min(run.turn, run.duration)
+        for edge in dict.fromkeys(model.manifest.edges):
+            parts[edge].append(at[[name == edge for name in passed.edges]])
+    return {edge: np.unique(np.concatenate(times)) for edge, times in parts.items()}
 
 
 def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:

@@ -161,11 +161,7 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
     found: list[np.ndarray] = [np.zeros(0)]
     for item in inputs:
         if item.kind == "gate":
-            for offset, rate, begin, end in _turning(item, values, t0, t1):
-                if rate != 0.0:
-                    for start, width in _windows(item, values):
-                        if 0.0 < width < TURN:
-                            found += [_passages(edge, offset, rate, begin, end) for edge in (start, start + width)]
+            found += [times for _, times in edge_times(item, values, t0, t1)]
         elif item.kind in ("table", "table_rate"):
             knots = _knots(item, values)[0]
             if not item.rate:
@@ -182,6 +178,15 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
         if not apart or time - apart[-1] > near:
             apart.append(time)
     return np.array(apart)
+
+
+def edge_times(gate: InputInfo, values: Values, t0: float, t1: float) -> Iterator[tuple[str, np.ndarray]]:
+    """Parameters or constants that are edges of a gate's windows, and times in [t0, t1] at which it passes them [s]."""
+    for offset, rate, begin, end in _turning(gate, values, t0, t1):
+        for names, (start, width) in zip(gate.windows, _windows(gate, values), strict=True):
+            if rate != 0.0 and 0.0 < width < TURN:
+                for name, edge in zip(names, (start, start + width), strict=True):
+                    yield name, _passages(edge, offset, rate, begin, end)
 
 
 def _lag_of(gate: InputInfo) -> InputInfo:
