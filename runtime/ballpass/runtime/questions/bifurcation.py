@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Option, Rtol
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
 #: Longest period of the equations that is taken between readings, in turns; else it is one turn.
 LONGEST_STROBE = 8.0
 
-#: Tolerances where none is given, of readings without tangents and with them.  In a turn in which the tangent
-#: shrinks to a thousandth its size depends on the last digits: at 1e-9 the press at 20 um is still 1.3 % off [1].
-DEFAULT_RTOL, TANGENT_RTOL = 1e-7, 1e-10
 
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
@@ -306,7 +304,7 @@ def _motion(
         times=step * np.arange(1, count + 1),
         parameters=parameters,
         initial=start,
-        rtol=DEFAULT_RTOL if rtol is None else rtol,
+        rtol=SECTION_RTOL if rtol is None else rtol,
         outputs=[],
         transient=0.0,
         progress=False,
@@ -314,7 +312,7 @@ def _motion(
     magnitude, grown = np.array(run.statistics.magnitudes), None
     states = run.x[settling:]
     if exponent:
-        tight = TANGENT_RTOL if rtol is None else rtol
+        tight = EXPONENT_RTOL if rtol is None else rtol
         states, growth = strobe_with_tangent(
             model, model.numbers(parameters), run.end, step, readings, magnitude, tight
         )

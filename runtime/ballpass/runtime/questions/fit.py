@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
@@ -33,8 +34,6 @@ INSIDE = 0.05
 #: Candidates of which each start is the best; the scene's values are the first.
 CANDIDATES = 8
 
-#: Tolerance of the runs where none is given [1].
-DEFAULT_RTOL = 1e-9
 
 #: Differences from quantities in their deviations from which on the report warns of them [1].
 FAR = 3.0
@@ -421,7 +420,7 @@ def fit(
     ranges = [parameter_range(model.manifest, "vary", text) for text in texts]
     sources = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
     columns = read_columns(signal)
-    tolerance = DEFAULT_RTOL if rtol is None else rtol
+    tolerance = FIT_RTOL if rtol is None else rtol
     misfit = Misfit(
         model,
         [read_trial(model.manifest, source, columns, k) for k, source in enumerate(sources, start=1)],

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import OPTIMUM_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Transient
@@ -37,8 +38,6 @@ BESIDE = 5e-3
 #: Slopes of the search and of the check agree within this share [1].
 AGREES = 1e-3
 
-#: Tolerance of the runs [1].
-RTOL = 1e-8
 
 #: Most tolerances; points within their box, beside its corners, of which the worst is taken; further ones that check.
 MOST_TOLERANCES, WITHIN, FURTHER = 6, 15, 256
@@ -351,7 +350,7 @@ def optimize(
     every = list(dict.fromkeys(one.name for one in (*ranges, *box)))
     lanes, exact = (
         QuantityFunction(
-            model, names, every, cycles, transient=transient, parameters=parameters, rtol=RTOL, kinks=kinks
+            model, names, every, cycles, transient=transient, parameters=parameters, rtol=OPTIMUM_RTOL, kinks=kinks
         )
         for kinks in (None, "located")
     )
@@ -369,7 +368,7 @@ def optimize(
         return found
 
     with (
-        kept_parts(keep, model, names, every, cycles, transient, parameters, RTOL, deviations) as parts,
+        kept_parts(keep, model, names, every, cycles, transient, parameters, OPTIMUM_RTOL, deviations) as parts,
         shown("searching", progress) as tell,
         warnings.catch_warnings(),
     ):

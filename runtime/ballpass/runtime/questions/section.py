@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.parameters import unknown_name
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.invariant_curve import InvariantCurve
 
-#: Tolerance where none is given [1].
-DEFAULT_RTOL = 1e-7
 
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
@@ -219,7 +218,7 @@ def section(
             duration=float(times[-1]),
             times=times,
             parameters=parameters,
-            rtol=DEFAULT_RTOL if rtol is None else rtol,
+            rtol=SECTION_RTOL if rtol is None else rtol,
             outputs=[],
             transient=0.0,
             progress=False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -39,8 +40,6 @@ SEGMENTS, KICKS = 8, (1e-3, 1e-2, 0.03, 0.1, 0.3)
 #: Moments at which the equations are compared.
 MOMENTS = 40
 
-#: Tolerance of branches [1].
-BRANCH_RTOL = 1e-9
 
 Turns = Annotated[
     float | None,
