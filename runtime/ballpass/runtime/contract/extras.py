@@ -26,9 +26,9 @@ INSTALL_COMPILER = 'Install gcc or clang, or a compiler from PyPI: `pip install 
 
 #: What works without a compiler, in messages and on the page about installing.
 WITHOUT_COMPILER = (
-    "Without a C compiler `run`, `stream`, `spectrum`, `animate`, `linearize`, `jacobian`, `explain` and `export --c` "
-    "work, in CasADi's virtual machine. `life`, `sensitivity`, `steady`, `sweep`, `trade`, `dataset`, `explore`, "
-    "`export --fmu`, and `run` with `--of`, `--error`, `--turns settle` or a method of the stepper, need one"
+    "Without a C compiler `run`, `stream`, `spectrum`, `section`, `animate`, `linearize`, `jacobian`, `explain` and "
+    "`export --c` work, in CasADi's virtual machine. All other commands that compute, `export --fmu`, and `run` with "
+    "`--of`, `--error`, `--turns settle` or a method of the stepper, need one"
 )
 
 

@@ -27,8 +27,7 @@ import casadi
 import numpy as np
 
 from ballpass.runtime.contract import Manifest, read_artefact
-from ballpass.runtime.contract.errors import CompileError, RequestError
-from ballpass.runtime.contract.extras import INSTALL_COMPILER
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
@@ -48,7 +47,7 @@ from ballpass.runtime.export.scene_numbers import (
     speed_table,
     varying,
 )
-from ballpass.runtime.native.compilers import find_compiler, run_compiler
+from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.magnitudes import model_scales
@@ -82,9 +81,9 @@ def export_fmu(
     Raises
     ------
     ArtefactError, RequestError
-        As for `ballpass.runtime.export.c_program.export_c`; a name that cannot be an input.
+        As for `ballpass.runtime.export.c_program.export_c`; a name that cannot be an input; no compiler.
     CompileError
-        There is no compiler, or it failed.
+        The compiler failed.
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
@@ -243,12 +242,7 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
 
 def _compiled(sources: Mapping[str, str], identifier: str) -> bytes:
     """The shared library, for any processor of this machine's kind."""
-    compiler = find_compiler()
-    if compiler is None:
-        raise CompileError(
-            "An FMU holds compiled code, and no C compiler was found ($CC, cc, gcc, clang, ziglang). "
-            f"{INSTALL_COMPILER}."
-        )
+    compiler = need_compiler("An FMU, which holds compiled code,")
     names = sorted(name for name in sources if name.endswith(".c"))
     own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
     with tempfile.TemporaryDirectory() as folder:

@@ -160,7 +160,7 @@ def _figures(_model: AnyModel, found: PoincareSection, _parameters: object) -> I
     yield "section", draw_section(found.states, found.phase, found.names, found.units, found.row, curve, words)
 
 
-@Question(stage="simulate", figures=_figures)
+@Question(stage="simulate", samples=True, figures=_figures)
 def section(
     model: AnyModel,
     of: State = None,

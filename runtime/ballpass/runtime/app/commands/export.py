@@ -62,6 +62,10 @@ def export(
             raise RequestError(
                 f"--out {target}: importers take an FMU by its ending. Allowed: a name that ends in .fmu."
             )
+        if fmu:
+            from ballpass.runtime.native.compilers import need_compiler
+
+            need_compiler("ballpass export --fmu")
         manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
         stages("export the FMU" if fmu else "export")
         # here, because they import CasADi
