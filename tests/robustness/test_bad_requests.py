@@ -122,6 +122,7 @@ def test_a_request_out_of_bounds_is_refused(model: Model, name: str, value: Any,
         model.simulate(**given)
 
 
+DATA = {"time": [0.0, 1e-3], "inner.y": [0.0, 0.0]}
 MANY = {"bearing.clearance": [1e-5]}
 
 #: Each ended in a traceback of a module deep inside.
@@ -155,6 +156,26 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: m.checked_jacobian("rhs", "inner.x", state=5), r"state: a text is expected, not 5 \(int\)"),
     (lambda m: m.sensitivities("bearing.clearance", cycles=0.1, rtol="a"), "rtol: a number from 1e-13 to"),
     (lambda m: m.hessian("rhs", 5), "hessian: wrt must be a pair of names"),
+    *((lambda m, name=name: getattr(m, name)([]), r"no function \[\]") for name in ("function", "kernel", "symbolic")),
+    (lambda m: m.loop([], ("t",)), r"name: a text is expected, not \[\] \(list\)"),
+    (lambda m: m.loop("rhs", 5), r"varying: one name or several in a list is expected, not 5 \(int\)"),
+    (lambda m: m.sample_outputs(1, 5, ["ball.force"]), "values: a mapping from name to value is expected, not 5"),
+    (lambda m: m.sample_outputs(1, {}, ["a"]), r"(?s)no output 'a'.*values: t is missing"),
+    (lambda m: m.virtual_integrator([]), r"intervals: \[\] \(list\) is no number\. Allowed: a number from 1 on"),
+    (lambda m: m.virtual_integrator(-1), "intervals: -1 lies outside its bounds"),
+    (lambda m: m.explore(""), r"path: a path is expected, not '' \(str\)"),
+    (lambda m: m.explore("x.html", units=5), r"units: a mapping from name to value is expected, not 5 \(int\)"),
+    (lambda m: m.explore("x.html", units={"a": "m", "bearing.clearance": "N"}), r"(?s)no parameter 'a'.*clearance: "),
+    (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", starts=1.5), "starts: 1.5 is no whole number"),
+    (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", starts=np.int64(-1)), "starts: -1 lies outside"),
+    (lambda m: m.fit(5, "bearing.clearance=1um:3um"), r"data: a file .* or a mapping .* expected, not 5 \(int\)"),
+    (lambda m: m.fit({"time": "a", "inner.y": [1.0]}, "bearing.clearance=1um:3um"), "trial 1, time: numbers in SI are"),
+    (lambda m: m.fit(DATA | {"bearing.clearance": [1e-6]}, "bearing.clearance=1um:3um"), "clearance: one number in SI"),
+    (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", keep=5), "keep: a path is expected, not 5"),
+    (lambda m: m.spectrum("inner.x", cycles=2, sensor=5), r"sensor: a sensor is expected, not 5 \(int\)"),
+    (lambda m: m.settle(transient="a"), "transient"),
+    (lambda m: m.reduce(1, kinks=np.zeros(2)), "no choice of kinks array"),
+    (lambda m: m.steady(parameters=5), r"parameters: a mapping from name to value is expected, not 5 \(int\)"),
     (lambda m: m.steady("a"), r"turns: 'a' \(str\) is no number\. Allowed: a number above 0"),
     (lambda m: QuantityFunction(m, "drive_work", 5), "wrt: one name or several"),
     (lambda m: QuantityFunction(m, "drive_work", "bearing.clearance", parameters=5), "parameters: a mapping"),
@@ -172,6 +193,10 @@ def test_an_argument_of_a_wrong_type_is_refused_in_words(
 ) -> None:
     with pytest.raises(RequestError, match=words):
         call(model)
+
+
+def test_a_function_of_no_name_is_none_that_a_model_has(model: Model) -> None:
+    assert [model.has(name) for name in ("rhs", "a", [], 5)] == [True, False, False, False]
 
 
 def test_names_may_be_given_in_any_kind_of_sequence(model: Model) -> None:

@@ -700,7 +700,7 @@ class Model(PointModel, Questions):
         Raises
         ------
         RequestError
-            The compiler is missing; the model has no states, or nothing that can be drawn.
+            The compiler is missing; the model has no states, or nothing that can be drawn; wrong units.
         SimulationError, CompileError
             The run of the scene's own numbers, or the compiler, failed.
 
@@ -711,7 +711,9 @@ class Model(PointModel, Questions):
         """
         from ballpass.runtime.export.web_assembly import check_compiler
         from ballpass.runtime.plot.explore import write_exploration
+        from ballpass.runtime.plot.sliders import check_units
 
+        check_units(self.manifest, units or {})
         check_compiler()
         return write_exploration(self, self.simulate(), path, units=units)
 

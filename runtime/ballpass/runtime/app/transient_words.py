@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.app.summary_words import inside, row_words
+from ballpass.runtime.certify.growth import largest_first
 from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.quantity.grammar import channels_of
@@ -61,11 +62,10 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     names = remembered(found)
     if not names:
         return []
-    name = max(names, key=lambda channel: found.changes[channel])
     return [
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
         f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
-        f"{', '.join(names)}, {name} by {100.0 * found.changes[name]:.2g} %. Give a run with a longer "
+        f"{largest_first({name: found.changes[name] for name in names})}. Give a run with a longer "
         "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
     ]
 

@@ -99,19 +99,36 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
         numbers = {
             key: _quantity(f"{name}, {key}", text, infos[key].unit) for key, text in said.items() if key in infos
         }
+    elif not hasattr(source, "keys"):
+        raise RequestError(
+            f"data: a file (CSV, NetCDF) or a mapping with time and columns is expected, not {source!r:.60} "
+            f"({type(source).__name__})."
+        )
     else:
         name = f"trial {number}"
-        numbers = {key: float(source[key]) for key in source if key in infos}
+        numbers = {key: float(_floats(name, key, source[key], ())) for key in source if key in infos}
         table = {str(key): (source[key], "") for key in source if key not in infos}
         if "time" not in table and table and all(np.size(value) <= 2 for value, _ in table.values()):
-            pairs = {key: np.atleast_1d(np.asarray(value, dtype=float)) for key, (value, _) in table.items()}
+            pairs = {key: np.atleast_1d(_floats(name, key, value)) for key, (value, _) in table.items()}
             rows = [(key, *(f"{number!r}" for number in pair.tolist())) for key, pair in pairs.items()]
             table = {"quantity": (rows, "")}
     if "quantity" in table:
         given = (_quantities(manifest, name, table["quantity"][0]),)
         return Trial(name=name, t=np.zeros(0), signals={}, parameters=numbers, quantities=given)
-    arrays = {key: (np.asarray(values, dtype=float), unit) for key, (values, unit) in table.items()}
+    arrays = {key: (_floats(name, key, values), unit) for key, (values, unit) in table.items()}
     return _trial(manifest, name, arrays, columns, numbers)
+
+
+def _floats(name: str, key: str, value: Any, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """The value as numbers; `shape`: the only one that is allowed."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or shape not in (None, array.shape):
+        what = "one number in SI is" if shape == () else "numbers in SI are"
+        raise RequestError(f"{name}, {key}: {what} expected, not {value!r:.60} ({type(value).__name__}).")
+    return array
 
 
 def _quantities(manifest: Manifest, name: str, rows: Sequence[Sequence[str]]) -> MeasuredQuantities:

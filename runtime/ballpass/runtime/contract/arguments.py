@@ -1,6 +1,6 @@
 """Arguments of Python calls of a wrong type, refused where they enter by what their annotations say.
 
-Names, texts and paths are checked here; numbers where their bounds are known.
+Names, texts, paths and mappings are checked here; numbers where their bounds are known.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 import functools
 import inspect
 import os
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
 from typing import Any, TypeVar, cast
 
@@ -17,16 +18,21 @@ from ballpass.runtime.contract.errors import RequestError
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class")
 
-_NAMES, _TEXT, _PATH = "one name or several in a list", "a text", "a path"
+_NAMES, _TEXT, _PATH, _MAPPING = "one name or several in a list", "a text", "a path", "a mapping from name to value"
 
 #: What is expected where these words stand in an annotation.
 _EXPECTED = {
     "str | Sequence[str]": _NAMES,
     "Sequence[str]": _NAMES,
+    "tuple[str, ...]": _NAMES,
     "str | Path": _PATH,
     "str": _TEXT,
+    "Mapping[str, Any]": _MAPPING,
+    "Mapping[str, float]": _MAPPING,
+    "Mapping[str, str]": _MAPPING,
     "LoadedModel": "a model that `load` gave",
     "Solution": "a solution of a run",
+    "Sensor": "a sensor",
 }
 #: The annotations that are checked.
 _KINDS = frozenset(kind + none for kind in _EXPECTED for none in ("", " | None"))
@@ -40,14 +46,17 @@ _EXAMPLES = {
     "name": '"ball.force"',
     "folder": '"generated/press"',
     "path": '"results/press.nc"',
+    "parameters": '{"bearing.clearance": 10e-6}',
+    "units": '{"bearing.clearance": "um"}',
     "model": 'load("generated/press")',
     "solution": "model.simulate()",
+    "sensor": "Sensor(resonance=8e3)",
 }
 
 
 def type_fault(name: str, annotation: str, value: Any) -> str | None:
     """Why a value is none of what an annotation says; None where it is one, or the annotation is of another kind."""
-    kind = annotation.replace("collections.abc.", "").replace("pathlib.", "")
+    kind = re.sub(r"\b(?:\w+\.)+", "", annotation)  # without modules
     optional = kind.removesuffix(" | None")
     expected = _EXPECTED.get(optional)
     if expected is None or (value is None and optional != kind) or _fits(expected, optional, value):
@@ -64,7 +73,10 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
     if expected == _TEXT:
         return isinstance(value, str)
     if expected == _PATH:
-        return isinstance(value, str | os.PathLike)
+        # an empty one would be the working directory
+        return isinstance(value, str | os.PathLike) and value != ""
+    if expected == _MAPPING:
+        return isinstance(value, Mapping)
     return any(base.__name__ == kind for base in type(value).__mro__)
 
 

@@ -69,6 +69,8 @@ class Option:
         name : name of the option for the caller
         kind : its type
         """
+        if is_number(value) and hasattr(value, "item"):
+            value = value.item()
         wanted = type_fault(name, kind.__name__ if isinstance(kind, type) else str(kind), value)
         if wanted is not None:
             return wanted
@@ -77,6 +79,9 @@ class Option:
             wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in self.choices]
             allowed, right = ", ".join(self.choices), not wrong
             given = "" if right else f"{wrong[0]!r:.60} is none of the choices"
+        elif kind in (int, int | None) and isinstance(value, float):
+            allowed, right = self._allowed("whole number"), False
+            given = f"{value!r} is no whole number"
         elif isinstance(value, int | float) and not isinstance(value, bool):
             kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
             allowed = self._allowed(kind)

@@ -15,7 +15,9 @@ from typing import Any
 import casadi
 
 from ballpass.runtime.contract import MODEL, Manifest, read_unchanged
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import ArtefactError, CompileError, RequestError
+from ballpass.runtime.contract.options import Option, refuse_faults
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
@@ -24,6 +26,8 @@ from ballpass.runtime.native.kernel import Array, CompiledKernel, CompiledLoop, 
 
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")
+
+_INTERVALS = Option(words="Equal output intervals.", least=1)
 
 #: Names of derivatives.
 _DERIVATIVE = re.compile(r"(?P<of>\w+?)_(?:jac_(?P<along>[a-z])|tangent)")
@@ -68,7 +72,7 @@ class CompiledFunctions:
 
     def has(self, name: str) -> bool:
         """Whether the manifest has a function of that name."""
-        return name in self._where
+        return isinstance(name, str) and name in self._where
 
     def function(self, name: str) -> casadi.Function:
         """CasADi function by name, compiled if possible.
@@ -78,6 +82,7 @@ class CompiledFunctions:
         RequestError
             The model has no such function.
         """
+        self._require(name)
         if name not in self._functions:
             with self._making:
                 self._functions[name] = self.symbolic(name) if self.library is None else self._external(name)
@@ -85,12 +90,15 @@ class CompiledFunctions:
 
     def kernel(self, name: str) -> CompiledKernel:
         """Function by name on memory of its own."""
+        self._require(name)
         if name not in self._own.kernels:
             self._own.kernels[name] = CompiledKernel(self.function(name))
         return self._own.kernels[name]
 
+    @typed
     def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
         """Function by name for many points at once; `varying` names the inputs that change between them."""
+        varying = tuple(varying)
         if (name, varying) not in self._own.loops:
             function = self.function(name)
             if self.library is None:
@@ -100,6 +108,7 @@ class CompiledFunctions:
             self._own.loops[name, varying] = loop
         return self._own.loops[name, varying]
 
+    @typed
     def sample_outputs(self, count: int, values: Mapping[str, Any], names: Sequence[str]) -> dict[str, Array]:
         """Outputs by name at `count` points, each of shape (count, rows).
 
@@ -107,9 +116,18 @@ class CompiledFunctions:
         ----------
         values : t, x and u at the points, p and c
         names : of outputs that are no states
+
+        Raises
+        ------
+        RequestError
+            Wrong names, or values that are missing.
         """
         loop = self.loop("outputs", _MOVING)
         known = [info.name for info in self.manifest.outputs]
+        unknown = [unknown_name("output", name, known) for name in names if name not in known]
+        unknown += [f"values: {name} is missing." for name in loop.function.name_in() if name not in values]
+        if unknown:
+            raise RequestError("\n".join(unknown))
         fields = dict(zip(known, loop.function.name_out(), strict=True))
         results = loop(count, values, [fields[name] for name in names])
         return {name: results[fields[name]] for name in names}
@@ -141,6 +159,7 @@ class CompiledFunctions:
 
     def virtual_integrator(self, intervals: int) -> casadi.Function:
         """CasADi's integrator over a grid, in the virtual machine (see `casadi_integrators`)."""
+        refuse_faults({"intervals": (int, _INTERVALS)}, {"intervals": intervals})
         with self._making:
             if intervals not in self._integrators:
                 manifest = self.manifest

@@ -12,7 +12,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ballpass.runtime.contract import Manifest, ParameterInfo
-from ballpass.runtime.contract.units import parse_quantity
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
 #: Units that people read numbers in, by SI unit, where a scene file says nothing else.
 READ_IN = {
@@ -43,6 +45,28 @@ FIRST = 8
 
 #: Half the range of a slider of a number that is zero, by SI unit.
 _AROUND_ZERO = {"m": 1e-3, "rad": math.pi, "m/s": 0.1, "N": 1000.0, "N*m": 10.0}
+
+
+def check_units(manifest: Manifest, units: Mapping[str, str]) -> None:
+    """Refuse units of unknown parameters, and units that are none.
+
+    Raises
+    ------
+    RequestError
+        All faults at once.
+    """
+    own = {info.name: info.unit for info in manifest.parameters}
+    faults = []
+    for name, unit in units.items():
+        if name not in own:
+            faults.append(unknown_name("parameter", name, own))
+        elif unit != own[name]:
+            try:
+                parse_quantity(f"1 {unit}", own[name])
+            except QuantityError as fault:
+                faults.append(f"units: {name}: {fault}")
+    if faults:
+        raise RequestError("\n".join(faults))
 
 
 def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ from functools import wraps
 from inspect import Parameter, cleandoc, signature
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.options import options_of, refuse_faults
 from ballpass.runtime.report.report import Report
 
@@ -58,6 +59,8 @@ class Question:
     steady: bool | Callable[[Any], Mapping[str, float]] = False
 
     def __call__(self, ask: _Function) -> _Function:
+        call = typed(ask)
+
         @wraps(ask)
         def checked(*given: Any, **named: Any) -> Any:
             values = signature(ask).bind(*given, **named)
@@ -65,7 +68,7 @@ class Question:
             refuse_faults(options_of(ask), values.arguments)
             if self.check is not None:
                 self.check(values.arguments)
-            return ask(*given, **named)
+            return call(*given, **named)
 
         checked.__doc__ = _with_options(ask)
         _DECLARED[checked] = replace(self, name=self.name or ask.__name__)

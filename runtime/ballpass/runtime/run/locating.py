@@ -40,7 +40,7 @@ def check_kinks(asked: str) -> Kinks:
         Another word.
     """
     for known in CHOICES:
-        if asked == known:
+        if isinstance(asked, str) and asked == known:
             return known
     raise RequestError(unknown_name("choice of kinks", asked, CHOICES))
 

@@ -53,7 +53,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
     IntegrationError
         The computation failed; the file is as it was.
     """
-    rate = checked_rate(request.sample_rate or 0.0)
+    rate = checked_rate(0.0 if request.sample_rate is None else request.sample_rate)
     turn = driver_angle.period(model.manifest, numbers.values)
     begin = start_time(request.initial)
     length = run_length(model, request, turn)
