@@ -10,6 +10,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 export PYTHON VENV
+# images of containers set it: each process of the tests would compile all of its modules anew
+unexport PYTHONDONTWRITEBYTECODE
 BIN := $(VENV)/bin
 
 .PHONY: demo test lint docs generated trade bench clean extremes compiler
