@@ -16,7 +16,7 @@ from evaluators import Evaluators, Point
 from parts import PARTS, REGISTERED, ROOT, Part
 
 from ballpass.derive import equations
-from ballpass.derive.features import count_operations, features
+from ballpass.derive.features import count_operations, features, operations_of
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
 
@@ -26,11 +26,6 @@ every_part = pytest.mark.parametrize("part", PARTS, ids=str)
 @cache
 def scene_of(text: str) -> Scene:
     return scene_from_text(text, "part")
-
-
-@cache
-def operations_of(text: str) -> dict[str, int]:
-    return count_operations(scene_of(text))
 
 
 @pytest.fixture(scope="module")
@@ -150,14 +145,14 @@ def results(one: Evaluators, of: Evaluators, point: Point, changes: Mapping[str,
 
 
 @pytest.mark.parametrize("part", [part for part in PARTS if part.path], ids=str)
-def test_a_scene_pays_for_it_only_where_it_names_it(part: Part) -> None:
+def test_a_scene_pays_for_it_only_where_it_names_it(part: Part, evaluators_of: Callable[[str], Evaluators]) -> None:
     """Its features list it; left out in memory it costs what a scene file costs that never named it."""
     scene = scene_of(part.text)
     (feature,) = [f for f in features(scene) if f.path == part.path]
     assert feature.without is not None
     assert feature.modelled
-    full, bare = operations_of(part.text), count_operations(feature.without)
-    assert bare == operations_of(part.without)
+    full, bare = operations_of(evaluators_of(part.text).functions), count_operations(feature.without)
+    assert bare == operations_of(evaluators_of(part.without).functions)
     assert sum(bare.values()) < sum(full.values())
     balls = part.registry in ("damping law", "effect")
     # loads depend on time alone: the law of a ball, which is called for each of them, is not touched

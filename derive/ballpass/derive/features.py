@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.elements import ELEMENTS
-from ballpass.derive.lowering.functions import lower, operations
+from ballpass.derive.lowering.functions import LoweredFunctions, lower, operations
 from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
 from ballpass.derive.scene.errors import SceneError
@@ -67,7 +67,11 @@ def count_operations(scene: Scene) -> dict[str, int]:
     SceneError
         The scene cannot be derived.
     """
-    lowered = lower(derive(scene), derivatives=False)
+    return operations_of(lower(derive(scene), derivatives=False))
+
+
+def operations_of(lowered: LoweredFunctions) -> dict[str, int]:
+    """`count_operations` of a scene that is lowered already."""
     counts = {f.name(): operations(f) for f, _ in (*lowered.functions, *lowered.equations)}
     if lowered.kernels is not None:
         counts |= {f"kernel.{k.function.name()}": operations(k.function) for k in lowered.kernels.functions}

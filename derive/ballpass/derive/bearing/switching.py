@@ -226,17 +226,21 @@ def _look(
     return _SwitchPlace(order=least, above=above, ends_above=ends_above, ends_below=ends_below)
 
 
-def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr, side: int) -> list[mpmath.mpc]:
-    """Values at the two small distances from the meeting place, above it (1) or below (-1)."""
+def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> tuple[list[mpmath.mpc], list[mpmath.mpc]]:
+    """Values at the two small distances from the meeting place, above it and below."""
     value = sp.lambdify(decides, expression, "mpmath")
     place = mpmath.mpf(meets.p) / meets.q
-    return [mpmath.mpmathify(value(place + side * mpmath.mpf(distance))) for distance in _DISTANCES]
+    distances = [mpmath.mpf(distance) for distance in _DISTANCES]
+    return (
+        [mpmath.mpmathify(value(place + distance)) for distance in distances],
+        [mpmath.mpmathify(value(place - distance)) for distance in distances],
+    )
 
 
 def _is_real(branch: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> bool:
     """Whether a branch has real values on both sides of the meeting place."""
     with mpmath.workdps(_DIGITS):
-        return all(value.imag == 0 for side in (1, -1) for value in _beside(branch, decides, meets, side))
+        return all(value.imag == 0 for side in _beside(branch, decides, meets) for value in side)
 
 
 def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> float:
@@ -246,8 +250,7 @@ def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> float:
     """
     order = math.inf
     with mpmath.workdps(_DIGITS):
-        for side in (1, -1):
-            near, far = _beside(difference, decides, meets, side)
+        for near, far in _beside(difference, decides, meets):
             if abs(near) > _ZERO:
                 power = mpmath.log(abs(far) / abs(near)) / mpmath.log(10)
                 order = min(order, round(EXPONENTS * float(power)) / EXPONENTS)
