@@ -73,6 +73,7 @@ class Absolute:
         self.motor, self.table = self.mechanism.driver.torque, self.mechanism.driver.table  # neither: constant speed
         self.free = self.motor is not None or self.table is not None  # the driver's angle is a state
         self.acceleration = 0.0  # of the driver, where its speed is given
+        self._arms: dict[tuple[str, str], Array] = {}
         self._chain = [(self.start, self._closed(self.start, self._guessed(guess)))]
 
     # numbers of the scene
@@ -92,6 +93,11 @@ class Absolute:
 
     def arm(self, body: str, point: str) -> Array:
         """A point in body axes, from the centre of mass; on the frame from the origin."""
+        if (body, point) not in self._arms:
+            self._arms[body, point] = self._arm(body, point)
+        return self._arms[body, point]
+
+    def _arm(self, body: str, point: str) -> Array:
         if body == FRAME:
             return self.vector(next(p.position for p in self.mechanism.frame_points if p.name == point))
         record = self.mechanism.body(body)
@@ -217,14 +223,14 @@ class Absolute:
     def ideal(self, angle: float) -> Array:
         """Pose of the linkage without play, followed from the start in small steps: angles do not jump."""
         last, q = min(self._chain, key=lambda entry: abs(entry[0] - angle))
-        step = 0.03
+        step = 0.1
         while last != angle:
             there = angle if abs(angle - last) < step else last + math.copysign(step, angle - last)
             moved = self._closed(there, q)
             if np.max(np.abs((moved - q)[2 : 3 * len(self.bodies) : 3])) > 0.2:  # another branch is near
                 step = abs(there - last) / 4
                 continue
-            last, q, step = there, moved, 0.03
+            last, q, step = there, moved, 0.1
             self._chain.append((last, q))
         return q
 
