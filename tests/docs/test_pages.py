@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -22,10 +23,12 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from ballpass.derive import generate
 from ballpass.derive.scene.units import looked_up_size
 from ballpass.runtime import BallpassError, load
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.ask.measured import read_trial
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.units import unit_size
@@ -61,6 +64,9 @@ NOT_READ = {
     "quantity,value": "a table of measurements, which a test below reads",
 }
 
+#: What a shell does with a command.
+SHELL = re.compile(r"[|<>;&$]")
+
 Block = tuple[str, str, int]
 
 
@@ -85,19 +91,31 @@ def commands(text: str) -> list[tuple[str, list[str]]]:
     return found
 
 
-def run_console(text: str, folder: Path) -> None:
+def run_command(command: str, folder: Path) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr: `ballpass` alone in this process, what needs a shell in one."""
+    words = shlex.split(command.replace(".venv/bin/", ""), comments=True)
+    if words[0] == "ballpass" and not SHELL.search(command):
+        done = CliRunner().invoke(app, words[1:])
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        return done.exit_code, done.stdout, done.stderr
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    called = subprocess.run(
+        ("bash", "-c", command.replace(".venv/bin/", "")),
+        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False, timeout=600,
+    )  # fmt: skip
+    return called.returncode, called.stdout, called.stderr
+
+
+def run_console(text: str, folder: Path) -> None:
     for command, shown in commands(text):
         if any(re.match(pattern, command) for pattern in NOT_RUN):
             continue
-        done = subprocess.run(
-            ("bash", "-c", command.replace(".venv/bin/", "")),
-            cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False, timeout=600,
-        )  # fmt: skip
+        code, out, err = run_command(command, folder)
         fails = any(line.startswith("error: ") for line in shown)
-        assert (done.returncode == 2) is fails, f"{command}\n{done.stderr[-2000:]}"
-        assert fails or done.returncode == 0, f"{command}\n{done.stderr[-2000:]}"
-        printed = done.stderr if fails else done.stdout
+        assert (code == 2) is fails, f"{command}\n{err[-2000:]}"
+        assert fails or code == 0, f"{command}\n{err[-2000:]}"
+        printed = err if fails else out
         for line in shown:
             assert line in printed, f"{command}\nprints\n{printed[-2000:]}"
 
@@ -127,15 +145,23 @@ def run_python(text: str, names: dict[str, Any]) -> None:
             assert f"{value:.{digits}g}" == f"{float(printed[0]):.{digits}g}", f"{source} gives {value}"
 
 
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The press and the one with tangent damping, as `ballpass derive` leaves them."""
+    folder = tmp_path_factory.mktemp("generated")
+    for scene in ("punching_press", "punching_press_tangent"):
+        generate(ROOT / "scenes" / f"{scene}.toml", folder / scene)
+    return folder
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
-def test_blocks_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_of_a_page_run(page: str, generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    shutil.copytree(generated, tmp_path / "generated")
     shutil.copy(ROOT / "scenes" / "punching_press.toml", tmp_path / "my_press.toml")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plt, "show", lambda: None)
-    for scene in ("punching_press", "punching_press_tangent"):
-        generate(tmp_path / "scenes" / f"{scene}.toml")
     names: dict[str, Any] = {}
     exec("import numpy as np", names)
     names["model"] = load("generated/punching_press")
@@ -156,8 +182,6 @@ def test_blocks_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.Mon
 def test_pages_name_the_commands_and_options_that_there_are() -> None:
     # the cheap part of the test above, which runs each time: what is written in command blocks exists
     from typer.main import get_command
-
-    from ballpass.runtime.app.cli import app
 
     known = get_command(app).commands  # type: ignore[attr-defined]
     for page in PAGES:
