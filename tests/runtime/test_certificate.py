@@ -178,6 +178,23 @@ def test_the_number_known_better_is_given_and_none_where_nothing_is_known(
     assert of_second is by_second
 
 
+@pytest.mark.parametrize(
+    ("own", "second", "uncertainty", "stated"),
+    [
+        (1e-9, 1.0005, 1e-7, 5e-4),  # the second is that far away, and known to be
+        (1e-9, 1.0005, 1e-3, 1e-9),  # it may be where the first is
+        (1e-3, 1.0005, 1e-3, 1e-3),
+    ],
+)
+def test_the_stated_uncertainty_reaches_to_a_number_that_excludes_the_derivative(
+    own: float, second: float, uncertainty: float, stated: float
+) -> None:
+    check = compare(1.0, own, second, uncertainty, route="x", quantum=0.0)
+    value, known, of_second = better_known(1.0, own, check)
+    assert not of_second
+    assert (value, known) == pytest.approx((1.0, stated), rel=1e-9)
+
+
 @pytest.mark.parametrize(("own", "second"), [(1.6e-2, 1e-9), (1e-9, 1.6e-2), (3e-2, 3e-2), (0.0, 1.0)])
 def test_the_reason_of_an_open_verdict_is_true(own: float, second: float) -> None:
     """Each comparison that it states holds."""

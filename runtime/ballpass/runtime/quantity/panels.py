@@ -38,6 +38,9 @@ ROUGH = 1e-4
 #: Most parts of a panel in one pass.
 PARTS = 8
 
+#: A step is too long for a square root at a kink beyond its end that is nearer than this share of its length [1].
+NEAR_KINK = 0.5
+
 #: Ends nearer to each other than this share of an interval are one [1].
 APART = 1e-9
 
@@ -127,11 +130,30 @@ def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panel
         at = np.concatenate(
             [[bool(np.any(kink[inner <= left + near]))], kink[free], [bool(np.any(kink[inner >= right - near]))]]
         )
+        kept = _apart_from_kinks(ends, at)
+        ends, at = ends[kept], at[kept]
         segment.append(np.full(len(ends) - 1, k))
         low.append(ends[:-1])
         high.append(ends[1:])
         kinked.append(np.stack([at[:-1], at[1:]], axis=1))
     return _spans(np.concatenate(segment), np.concatenate(low), np.concatenate(high), np.concatenate(kinked))
+
+
+def _apart_from_kinks(ends: Array, at: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Ends to keep, shape of `ends`.
+
+    Steps end on kinks, and the last step before one may be much shorter than those before it.  A function that grows
+    like the square root of time at the kink is then not smooth in the longer step beside it, and one span of both
+    steps, over which s is taken, resolves it.
+    """
+    kept, last = np.ones(len(ends), dtype=bool), len(ends) - 1
+    for kink in np.flatnonzero(at).tolist():
+        for way in (-1, 1):
+            k = kink + way
+            while 0 < k < last and not at[k] and abs(ends[k] - ends[kink]) < NEAR_KINK * abs(ends[k + way] - ends[k]):
+                kept[k] = False
+                k += way
+    return kept
 
 
 def split(panels: Panels, parts: NDArray[np.int_]) -> Panels:
