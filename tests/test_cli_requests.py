@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.main import get_command
 from typer.testing import Result
 
 from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load_solution
+from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"
@@ -191,3 +193,22 @@ def test_a_command_without_an_option_that_it_needs_says_what_the_option_takes(
     done = ballpass("spectrum", SCENE)
     assert (done.exit_code, done.stderr.count("is missing")) == (2, 1)
     assert "--of is missing. It takes: output or state of the scene with one value" in done.stderr
+
+
+def test_a_command_without_its_arguments_says_what_each_takes(ballpass: Callable[..., Result]) -> None:
+    """What every command says of options holds for arguments: also of a second one, and in every command."""
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    arguments = {
+        name: [item.metavar for item in command.params if item.param_type_name == "argument" and item.required]
+        for name, command in commands.items()
+    }
+    asked = {name: wanted for name, wanted in arguments.items() if wanted}
+    assert asked.keys() >= {"run", "dataset", "steady", "trade"}
+    assert asked["fit"] == ["SCENE", "DATA"]
+    for name, wanted in asked.items():
+        for k, missing in enumerate(wanted):
+            done = ballpass(name, *[SCENE] * k)
+            assert done.exit_code == 2
+            assert f"error: {name}: {missing} is missing. It takes: " in done.stderr
+            assert f"Write: ballpass {name} {' '.join(wanted)}, then options" in done.stderr
+    assert ballpass("run", SCENE, "a", "b").exit_code == 2

@@ -13,7 +13,7 @@ import typer
 from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
-from ballpass.runtime.app.commands.declared import as_command, question_command
+from ballpass.runtime.app.commands.declared import Command, as_command, question_command
 from ballpass.runtime.app.commands.derive import derive, equations
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.explore import explore
@@ -61,6 +61,6 @@ for _panel, _commands in {
     SIMULATE: (run, export, animate, explore, dataset, stream, sweep),
 }.items():
     for _command in _commands:
-        app.command(rich_help_panel=_panel)(as_command(_command))
+        app.command(cls=Command, rich_help_panel=_panel)(as_command(_command))
 for _question in (*QUESTIONS, trade):
-    app.command(rich_help_panel=ASK)(question_command(_question))
+    app.command(cls=Command, rich_help_panel=ASK)(question_command(_question))

@@ -25,7 +25,9 @@ def dataset(
     spec: Annotated[
         Path,
         typer.Argument(
-            help="What the data set is made of (TOML); `ballpass new bearing-faults` copies one.", show_default=False
+            metavar="SPEC",
+            help="What the data set is made of (TOML); `ballpass new bearing-faults` copies one.",
+            show_default=False,
         ),
     ],
     out: Annotated[

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperArgument, TyperCommand
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
@@ -36,6 +37,25 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
+
+
+class Command(TyperCommand):
+    """A command that asks for a missing argument as for everything else: what, what is allowed, what to write."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as fault:
+            missing = fault.param
+            if not isinstance(missing, TyperArgument) or fault.message:  # typer gives a missing argument no message
+                raise
+            words = missing.help or ""
+            wanted = " ".join(str(each.metavar) for each in self.params if isinstance(each, TyperArgument))
+            complain(
+                f"{self.name}: {missing.metavar} is missing. It takes: {words[:1].lower()}{words[1:]} "
+                f"Write: ballpass {self.name} {wanted}, then options; --help lists them."
+            )
+            raise typer.Exit(2) from None
 
 
 def as_command(function: Callable[..., None]) -> Callable[..., None]:

@@ -18,7 +18,11 @@ SceneFile = Annotated[
 #: Of commands that need only the generated folder.
 SceneOrFolder = Annotated[
     Path,
-    typer.Argument(metavar="SCENE", help="Scene file (TOML), or a generated folder in its place.", show_default=False),
+    typer.Argument(
+        metavar="SCENE",
+        help="Scene file (TOML), which `ballpass new` copies, or a generated folder in its place.",
+        show_default=False,
+    ),
 ]
 
 #: Of questions that also take a finished run.
@@ -26,7 +30,8 @@ SceneFolderOrRun = Annotated[
     Path,
     typer.Argument(
         metavar="SCENE",
-        help="Scene file (TOML), or the solution.nc of a run, or what ballpass stream wrote.",
+        help="Scene file (TOML), which `ballpass new` copies, or the solution.nc of a run, or what ballpass stream "
+        "wrote.",
         show_default=False,
     ),
 ]
