@@ -18,7 +18,9 @@ from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.export.c_program import program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind
 from ballpass.runtime.native.compilers import run_compiler
+from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.quantity.kinds.life import PLACES
 from ballpass.runtime.ratings.of_bearing import ratings_of
@@ -27,7 +29,7 @@ from ballpass.runtime.ratings.of_bearing import ratings_of
 CALLED = (
     *(f"ballpass_{name}" for name in ("make", "value", "set_at", "start", "run_to", "read", "error")),
     *(f"ballpass_{name}" for name in ("stop", "values", "drawn", "ratings", "next_switch")),
-    *(f"ballpass_{name}" for name in ("state_size", "save", "restore")),
+    *(f"ballpass_{name}" for name in ("state_size", "save", "restore", "reduce")),
     "malloc",
 )
 
@@ -35,6 +37,7 @@ CALLED = (
 _FLAGS = (
     *("-target", "wasm32-wasi", "-mexec-model=reactor", "-O3", "-msimd128"),
     *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"),
+    "-DBALLPASS_REDUCTIONS",
     *("-Wl,--strip-all", *(f"-Wl,--export={name}" for name in CALLED)),
 )
 
@@ -63,8 +66,9 @@ def web_assembly(model: LoadedModel) -> bytes:
     symbolic = LoadedModel(model.folder, model.manifest, None)
     texts = {name: text for name, text in program_texts(symbolic).items() if name.endswith((".c", ".h"))}
     texts = {name: text for name, text in texts.items() if name not in ("main.c", "example.c")}
-    texts["page.c"] = (STANDALONE / "page.c").read_text(encoding="utf-8")
-    texts["simulation.h"] = (STANDALONE / "simulation.h").read_text(encoding="utf-8")
+    texts |= {name: (STANDALONE / name).read_text(encoding="utf-8") for name in ("page.c", "simulation.h")}
+    texts |= {name: (DRIVER / name).read_text(encoding="utf-8") for name in ("reductions.h", "powers.h")}
+    texts[REDUCTION_TABLES] = reduction_tables()
     texts["drawn.c"] = behind("What a page draws", _drawn(symbolic), "scene_drawn", MOMENT, "y")
     texts["ratings.c"] = behind("Ratings of the bearings", _ratings(symbolic), "scene_ratings", MOMENT[-2:], "y")
     with tempfile.TemporaryDirectory(prefix="ballpass-") as name:

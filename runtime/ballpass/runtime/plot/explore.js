@@ -82,8 +82,9 @@ const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) +
 
 // Rows of the table: key, words, unit, value, where.
 function resultsOf(run) {
-  const found = [], measures = [], series = [];
+  const found = [], measures = [], series = [], forces = [];
   const rest = (key, words, unit, value) => found.push({ key, words, unit, value });
+  const shortly = (words) => { found.at(-1).short = words; }; // in the line above the sliders
   const peak = (key, words, unit, measure) => {
     found.push({ key, words, unit, place: measures.length });
     measures.push(measure);
@@ -92,12 +93,14 @@ function resultsOf(run) {
   };
   solver.bearings.forEach((bearing, k) => {
     const name = numbers.bearings[k].name, of = name && ` of ${name}`, id = name && `${name}.`;
+    forces.push(measures.length);
     const force = peak(`${id}peak_ball_force`, `Highest ${numbers.bearings[k].noun} force${of}`, "N", (row) => { let most = -Infinity; for (const column of bearing.force) if (row[column] > most) most = row[column]; return most; });
     rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ${numbers.bearings[k].noun}${of}`, "N", rms(run, force));
     const life = bearing.life ? lifeOf(run, bearing) : 0;
-    if (life) found.push({ key: `${id}life`, words: `Rating life${of}, 90 % of such bearings run longer`, unit: "h", value: life, digits: 3 });
+    if (life) found.push({ key: `${id}life`, words: `Rating life${of}, 90 % of such bearings run longer`, unit: "h", value: life, digits: 3, short: `life${of}` });
     if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing.load, row)))));
     peak(`${id}peak_motion`, `Furthest that the rings are apart${of}`, "\u00b5m", (row) => length(motionOf(bearing, row)));
+    shortly(`rings apart${of}`);
     const parts = [0, 1].map((axis) => measured(run, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));
     rest(`${id}rms_motion`, `Rms of their motion about its mean${of}`, "\u00b5m", rms(run, parts[0].map((x, n) => Math.hypot(x - middle[0], parts[1][n] - middle[1]))));
   });
@@ -107,9 +110,12 @@ function resultsOf(run) {
   });
   if (solver.torque !== null) {
     peak("peak_torque", "Highest drive torque, either way", "N\u00b7m", (row) => Math.abs(row[solver.torque]));
+    shortly("torque");
     if (run.speed && solver.angle === null) rest("drive_work", "Work of the drive in a turn", "J", Math.sign(run.speed) * TURN * mean(run, measured(run, (row) => row[solver.torque])));
   }
   const tops = peaks(run, measures, series);
+  // of ball forces the highest of any step, which samples may miss by far
+  solver.bearings.forEach((bearing, k) => { if (run.tops[k].value > tops[forces[k]].value) tops[forces[k]] = run.tops[k]; });
   return found.map((one) => (one.place === undefined ? one : { ...one, value: tops[one.place].value,
     where: run.speed && solver.angle === null ? degrees(run, tops[one.place].time) : `at ${(1e3 * tops[one.place].time).toFixed(2)} ms` }));
 }
@@ -135,8 +141,10 @@ function showResults(results, olds) {
   get("sum").replaceChildren();
   if (!one) return;
   element(get("sum"), "span", `${one.words} `);
-  element(get("sum"), "b", `${one.value.toPrecision(4)} ${one.unit}`);
+  element(get("sum"), "b", `${written(one.value, 4)} ${one.unit}`);
   element(get("sum"), "span", one.value === olds[0].value ? " (numbers of the scene)" : `, ${difference(one.value, olds[0].value)} against the scene`);
+  const more = element(get("sum"), "div", "", { class: "more" });
+  results.forEach((row, k) => { if (row.short && more.childElementCount < 3) element(more, "span", `${row.short} ${written(row.value, 3)} ${row.unit}${row.value === olds[k].value ? "" : `, ${difference(row.value, olds[k].value)}`}`); });
 }
 
 // ------------------------------------------------------------------------------------------------------- more pictures

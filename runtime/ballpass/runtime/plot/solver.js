@@ -15,8 +15,8 @@ async function loadSolver() {
   for (const { module: space, name } of WebAssembly.Module.imports(module)) (system[space] ??= {})[name] = () => 52;
   const { exports } = await WebAssembly.instantiate(module, system);
   exports._initialize?.();
-  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), ratings: exports.malloc(16 * solver.bearings.length + 8), saved: exports.malloc(exports.ballpass_state_size()) };
-  if (!machine.one || !machine.row || !machine.ratings || !machine.saved) throw new Error("The memory is too small for the solver.");
+  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), ratings: exports.malloc(16 * solver.bearings.length + 8), saved: exports.malloc(exports.ballpass_state_size()), reduction: exports.malloc(8 * solver.reduction.size) };
+  if (!machine.one || !machine.row || !machine.ratings || !machine.saved || !machine.reduction) throw new Error("The memory is too small for the solver.");
 }
 
 const inMemory = (place, count) => new Float64Array(machine.memory.buffer, place, count);
@@ -45,6 +45,10 @@ async function solve(values, stale) {
   const time = (k) => whole * (k / count), least = transient ? transient * turn * (1 - 1e-12) : 0;
   let first = 0, began = performance.now();
   while (time(first) < least) first += 1;
+  const reduced = inMemory(machine.reduction, solver.reduction.size).fill(0); // the highest ball forces, of every step
+  reduced[solver.reduction.from] = least * (1 - 1e-9);
+  for (const { top } of solver.bearings) reduced[top.wanted] = 1;
+  machine.ballpass_reduce(machine.one, machine.reduction);
   const rows = new Float64Array((count - first + 1) * width), jumps = [];
   const apart = 1e-10 * whole; // closer than this a sample and a switch are one time
   let next = -1, reached = 0;
@@ -78,8 +82,10 @@ async function solve(values, stale) {
     nodes.push(rows.subarray(k * width, (k + 1) * width));
   }
   machine.ballpass_ratings(machine.one, machine.ratings);
-  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice();
-  return { values, known, ratings, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
+  machine.ballpass_reduce(machine.one, 0);
+  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), row = inMemory(machine.reduction, solver.reduction.size);
+  const tops = solver.bearings.map(({ top }) => ({ value: row[top.max], time: row[top.max_time] }));
+  return { values, known, ratings, tops, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
 }
 
 // Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.

@@ -14,7 +14,7 @@ from typing import Any
 from ballpass.runtime.contract import BearingInfo, Manifest, force_components, table_direction
 from ballpass.runtime.export.scene_numbers import columns_of
 from ballpass.runtime.export.web_assembly import drawn_columns
-from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.native.reduction_rows import HEAD, SECTORS, reduction_rows
 from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
 from ballpass.runtime.ratings.of_bearing import rated_element
@@ -49,6 +49,7 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
         "torque": column.get("drive_torque"),
         "linkage": None if mechanism is None else _linkage(record, numbers["linkage"]["forces"], place, column),
         "bearings": [_bearing(record, info, place, column) for info in drawn],
+        "reduction": {"size": reduction_rows(manifest).size, "from": HEAD.index("from")},
     }
 
 
@@ -117,6 +118,7 @@ def _bearing(
         return f"{bearing.prefix}{name}"
 
     force = own("ball.force") if own("ball.force[1]") in column else own("ball.elastic_force")
+    rows = reduction_rows(record.manifest)
     load: dict[str, Any] | None = None
     if pair(own("load")) is not None:
         load = {"columns": pair(own("load")), "sign": 1, "share": None, "count": None}
@@ -134,6 +136,7 @@ def _bearing(
         "ball": place[f"{bearing.path}.ball_diameter"],
         "clearance": place[f"{bearing.path}.clearance"],
         "force": [column[f"{force}[{k + 1}]"] for k in range(bearing.balls)],
+        "top": {kind: rows.column(kind, force) for kind in ("wanted", "max", "max_time")},
         "inner": pair(own("inner")),
         "outer": pair(own("outer")),
         "load": load,

@@ -62,6 +62,7 @@ struct ballpass {
     double *inputs; /* of the call's segments */
     unsigned char *restarts;
     void *work;
+    double *reduction; /* see ballpass_reduce; NULL: none */
 };
 
 static size_t work_size(void)
@@ -336,6 +337,8 @@ int ballpass_check_bounds(ballpass *s)
 
 void ballpass_stop(ballpass *s) { s->run.started = 0; }
 
+void ballpass_reduce(ballpass *s, double *row) { s->reduction = row; }
+
 void ballpass_put(ballpass *s, int place, double value) { s->run.values[place] = value; }
 
 /* Values; derived constants; tables; the linkage. */
@@ -422,6 +425,7 @@ static int run_call(ballpass *s, double time)
                                       .first_step = r->first_step,
                                       .largest_step = INFINITY,
                                       .tolerance = r->tolerance,
+                                      .reduction = s->reduction,
                                       .work = s->work,
                                       .resume = r->begun,
                                       .pause = 1};
