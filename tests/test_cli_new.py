@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -194,3 +195,15 @@ def test_help_groups_all_commands_in_80_columns() -> None:
     assert max(map(len, lines)) <= 80
     heads = [line.strip("╭─╮ ") for line in lines if line.startswith("╭")]
     assert heads == ["Options", DESCRIBE, SIMULATE, ASK]  # none is left over in "Commands"
+
+
+def test_a_missing_scene_that_comes_with_ballpass_is_named_with_the_command_that_copies_it(tmp_path: Path) -> None:
+    """A newcomer copies a command of the documentation outside the repository."""
+    missing = tmp_path / "some scenes" / "punching_press.toml"
+    done = call("run", missing)
+    assert done.exit_code == 2
+    words = done.stderr.split("`ballpass new ")[1].split("` copies it")[0]
+    assert words == f"press '{missing.parent}'"
+    assert call("new", *shlex.split(words)).exit_code == 0
+    assert missing.exists()
+    assert "`ballpass new --list`" in call("run", tmp_path / "own.toml").stderr

@@ -10,6 +10,7 @@ Keys are declared at the records that they fill (`ballpass.derive.scene.keys`). 
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -28,6 +29,7 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
 from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, RunSettings, Scene, UnbalanceLoad, quantities_of
+from ballpass.derive.scene.shipped import shipped_scenes
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
@@ -83,7 +85,7 @@ def read_scene(
         data = read_file(file, MAX_FILE_SIZE)
     except OSError as error:
         raise _unreadable(
-            file, error.strerror or type(error).__name__, "give the path of a scene file (TOML)"
+            file, error.strerror or type(error).__name__, f"give the path of a scene file (TOML){_copy_of(file)}"
         ) from None
     except ValueError:  # a NUL in the path
         raise _unreadable(file, "this is not a path", "give the path of a scene file (TOML)") from None
@@ -104,6 +106,17 @@ def scene_from_text(text: str, name: str) -> Scene:
         With all faults of the text.
     """
     return _scene(text, name, None)
+
+
+def _copy_of(file: Path) -> str:
+    """How to get a missing file, in words: with its own name where it comes with ballpass."""
+    if file.exists():
+        return ""
+    name = next((name for name, scene in shipped_scenes().items() if scene.name == file.name), None)
+    if name is None:
+        return "; `ballpass new --list` names those that come with ballpass"
+    folder = "" if file.parent == Path() else f" {shlex.quote(str(file.parent))}"
+    return f"; this one comes with ballpass: `ballpass new {name}{folder}` copies it"
 
 
 def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) -> SceneError:
