@@ -211,4 +211,5 @@ def test_a_command_without_its_arguments_says_what_each_takes(ballpass: Callable
             assert done.exit_code == 2
             assert f"error: {name}: {missing} is missing. It takes: " in done.stderr
             assert f"Write: ballpass {name} {' '.join(wanted)}, then options" in done.stderr
+    assert "error: stream: --out is missing. It takes: netCDF-4 file to write" in ballpass("stream", SCENE).stderr
     assert ballpass("run", SCENE, "a", "b").exit_code == 2

@@ -27,6 +27,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.reduction_rows import why_void
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
@@ -57,9 +58,6 @@ MOST_DEFLECTION = 0.01
 
 #: Numbers that `add_turns` names; the file has all.
 SHOWN = 5
-
-#: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
-TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 
 
 def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict[str, Any]:

@@ -9,8 +9,8 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.app.summary_words import row_place, row_words
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.report.report import ReportTable
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.app.summary_words import inside, row_words
 from ballpass.runtime.certify.growth import largest_first
 from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve

@@ -52,7 +52,7 @@ def complex_facts(m: complex) -> dict[str, float]:
 
 def contact_words(contacts: ContactSequence) -> str:
     """A signature, and whether it is near another one."""
-    words = f"contacts in a period: {contacts.words}"
+    words = f"Contacts in a period, balls or rollers by number: {contacts.words}"
     if not contacts.grazes:
         return words
     return (

@@ -30,6 +30,9 @@ from functools import lru_cache
 
 from ballpass.runtime.contract.errors import RequestError
 
+#: Unit of a number in a file -> factor and unit in tables and figures, where six digits of a displacement are six then.
+TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+
 #: Longest text read as a quantity; the longest sensible one has some thirty characters.
 MAX_LENGTH = 100
 #: Largest power of a unit; rational arithmetic with "m^1000000" would not end.

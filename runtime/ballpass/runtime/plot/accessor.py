@@ -14,6 +14,7 @@ import numpy as np
 from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot.animate import animation_page, write_animation
 from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.show import html
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.plot.record import Record
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.run.solution import Solution
-
-#: Lengths and velocities of a bearing are read in smaller units than SI: factor and unit.
-_READ_IN = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 
 #: Most lines of a legend, and names on an axis.
 _LEGEND, _NAMED = 12, 3
@@ -288,7 +286,7 @@ def _read_in(unit: str) -> tuple[float, str]:
     need("matplotlib")
     from ballpass.runtime.plot.style import unit_words
 
-    factor, shown = _READ_IN.get(unit, (1.0, unit))
+    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
     return factor, unit_words(shown)
 
 

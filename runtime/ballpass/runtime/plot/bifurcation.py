@@ -13,13 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot.style import GREY, INK, PALE, SIGNAL, caption, label, new_figure, styled
 
 #: Shades of the kinds of motion; what is periodic has none.
 _SHADES = {"chaotic": "#f6d5d9", "quasi-periodic": "#fbeccb", "undecided": PALE}
-
-#: Lengths whose values are shown in micrometres.
-_SMALL = 1e-3
 
 
 @styled
@@ -38,8 +36,10 @@ def draw_bifurcation(
     figure = new_figure(6.4 if exponents else 4.4)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0)) if exponents else [figure.add_subplot()]
     above = panels[0]
-    factor, shown_unit = _scale(max(float(np.max(np.abs(m.states[:, row]))) for m in up), unit)
-    for motions, colour, size, words in ((up, INK, 4.0, "up"), (down, SIGNAL, 1.2, "down")):
+    factor, shown_unit = TABLE_UNITS.get(unit, (1.0, unit))
+    # dots of few values stand apart and may be larger: the red ones within the blue ones
+    wide = min(max(80.0 / len(up), 1.0), 3.0)
+    for motions, colour, size, words in ((up, INK, 4.0 * wide, "up"), (down, SIGNAL, 1.5 * wide, "down")):
         across = np.concatenate([np.full(len(m.states), m.value / vary.factor) for m in motions])
         heights = factor * np.concatenate([m.states[:, row] for m in motions])
         above.plot(across, heights, ".", color=colour, markersize=size, markeredgewidth=0, label=words, rasterized=True)
@@ -59,7 +59,7 @@ def draw_bifurcation(
     panels[-1].margins(x=0.01)
     handles, labels = above.get_legend_handles_labels()
     patches = [Patch(color=_SHADES[kind], label=kind) for kind in kinds]
-    figure.legend([*handles, *patches], [*labels, *kinds], loc="outside upper right", ncols=5, markerscale=3.0)
+    figure.legend([*handles, *patches], [*labels, *kinds], loc="outside upper right", ncols=5, markerscale=3.0 / wide)
     caption(
         figure,
         "Bifurcation diagram",
@@ -67,10 +67,6 @@ def draw_bifurcation(
         "batch means; shades are the kinds of motion on the way up.",
     )
     return figure
-
-
-def _scale(largest: float, unit: str) -> tuple[float, str]:
-    return (1e6, "um") if unit == "m" and largest < _SMALL else (1.0, unit)
 
 
 def _shade(panels: Sequence[Any], vary: ParameterRange, up: Sequence[Any]) -> list[str]:

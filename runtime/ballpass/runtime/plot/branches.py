@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.continuation import KINDS, SteadyBranch
 from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot.style import GREY, INK, MANY, SIGNAL, caption, label, new_figure, styled
 
 #: Markers of the points at which the kind of the states changes.
@@ -38,9 +39,10 @@ def draw_branches(branches: Sequence[SteadyBranch], over: ParameterRange, state:
     """The first state at t = 0 and the largest multiplier over the parameter; unstable states are dashed."""
     figure = new_figure(6.2)
     above, below = figure.subplots(2, 1, sharex=True)
+    factor, shown_unit = TABLE_UNITS.get(state_unit, (1.0, state_unit))
     for branch, look in zip(branches, MANY, strict=False):
         values = np.array([point.value / over.factor for point in branch.points])
-        heights = np.array([point.nodes[0, 0] for point in branch.points])
+        heights = factor * np.array([point.nodes[0, 0] for point in branch.points])
         sizes = np.array([abs(point.multipliers[0]) for point in branch.points])
         stable = np.array([point.stable or bool(point.kind) for point in branch.points])
         colour, words = look["color"], f"period {branch.repeats}"
@@ -48,18 +50,19 @@ def draw_branches(branches: Sequence[SteadyBranch], over: ParameterRange, state:
             axes.plot(values, ordinates, color=colour, linestyle=(0, (4, 2)), linewidth=1.0)
             axes.plot(values, np.where(stable, ordinates, np.nan), color=colour, linewidth=1.8, label=words)
         for point in branch.special:
-            above.plot(
-                point.value / over.factor, point.nodes[0, 0], _MARKERS[point.kind], color=INK, markersize=5, zorder=5
-            )
+            height, marker = factor * point.nodes[0, 0], _MARKERS[point.kind]
+            above.plot(point.value / over.factor, height, marker, color=INK, markersize=5, zorder=5)
         for point in (point for pair in branch.contact_changes for point in pair):
-            above.plot(point.value / over.factor, point.nodes[0, 0], "|", color=GREY, markersize=9)
+            above.plot(point.value / over.factor, factor * point.nodes[0, 0], "|", color=GREY, markersize=9)
+    if any(not (point.stable or point.kind) for branch in branches for point in branch.points):
+        above.plot([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=1.0, label="unstable")
     for kind, marker in _MARKERS.items():
         if any(point.kind == kind for branch in branches for point in branch.points):
             above.plot([], [], marker, color=INK, markersize=5, label=kind)
     if any(branch.contact_changes for branch in branches):
         above.plot([], [], "|", color=GREY, markersize=9, label="contacts change")
     below.axhline(1.0, color=GREY, linewidth=1.0)
-    above.set_ylabel(label(f"{state} at t = 0", state_unit))
+    above.set_ylabel(label(f"{state} at t = 0", shown_unit))
     below.set_ylabel(label("largest multiplier, magnitude", "1"))
     below.set_xlabel(label(over.words, over.shown_unit))
     above.legend(loc="best")

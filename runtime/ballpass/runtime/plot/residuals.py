@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot.style import FIRST, GREY, INK, SIGNAL, caption, label, new_figure, styled
 
 #: Lags of the correlation that are shown.
@@ -32,11 +33,12 @@ def draw_residuals(
         axis
     ]
     dot = 2.0 if axis == "time" else 6.0
-    above.plot(t, measured, ".", color=GREY, markersize=dot, label="measured", rasterized=True)
+    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+    above.plot(t, factor * measured, ".", color=GREY, markersize=dot, label="measured", rasterized=True)
     line = {"linewidth": 0.9} if axis != "quantity" else {"linestyle": "none", "marker": "x"}
-    above.plot(t, model, **{**FIRST, **line}, label="model")
+    above.plot(t, factor * model, **{**FIRST, **line}, label="model")
     above.set_xlabel(along)
-    above.set_ylabel(label(name, unit))
+    above.set_ylabel(label(name, shown))
     above.legend(loc="upper right")
     left = (model - measured) / noise
     below.plot(t, left, ".", color=INK, markersize=dot, rasterized=True)

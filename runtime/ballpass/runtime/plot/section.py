@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.invariant_curve import InvariantCurve
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot.style import INK, SIGNAL, caption, label, new_figure, styled
 
 #: Points along the curve.
@@ -42,9 +43,8 @@ def draw_section(
     half = len(names) // 2
     # a coordinate is shown over its rate, whichever of the two was named
     place, rate = row % half, row % half + half
-    factors, shown = np.ones(len(names)), list(units)
-    if units[place] == "m":
-        factors[place], shown[place] = 1e6, "um"
+    scales = [TABLE_UNITS.get(unit, (1.0, unit)) for unit in units]
+    factors, shown = np.array([factor for factor, _ in scales]), [unit for _, unit in scales]
     points = {"color": INK, "marker": "o", "markersize": 2.6, "linestyle": "none", "markeredgewidth": 0}
     heights = factors * states
     section.plot(heights[:, place], heights[:, rate], label="points", **points)
@@ -55,6 +55,7 @@ def draw_section(
         look = {"color": SIGNAL, "linewidth": 0.9, "zorder": 1}
         section.plot(heights[:, place], heights[:, rate], label="curve that was fitted", **look)
         over.plot(along, heights[:, place], **look)
+    section.locator_params("x", nbins=5)
     section.set_xlabel(label(names[place], shown[place]))
     section.set_ylabel(label(names[rate], shown[rate]))
     over.set_xlabel(label("place of the balls", "ball pitch"))

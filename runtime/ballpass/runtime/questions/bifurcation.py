@@ -113,10 +113,11 @@ class Bifurcation(ShortRepr, Reported):
                 ends = f"{members[0].value / factor:.6g} to {members[-1].value / factor:.6g}"
                 ends = ends if len(members) > 1 else f"{members[0].value / factor:.6g}"
                 rows.append((name, ends, kind, _span([m.exponent for m in members if m.exponent is not None])))
+        shown = 4 if self.up[0].exponent is not None else 3
         table = ReportTable(
             title=f"Motion over {self.vary.name}, read {self.every}",
-            heads=("direction", f"values, {unit}", "motion", "largest exponent per reading"),
-            rows=rows,
+            heads=("direction", f"values, {unit}", "motion", "largest exponent per reading")[:shown],
+            rows=[row[:shown] for row in rows],
         )
         said = []
         if self.apart:

@@ -14,7 +14,7 @@ from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
-from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.contract.units import TABLE_UNITS, QuantityError, parse_quantity
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -246,7 +246,7 @@ class FitAnswer(ShortRepr, Reported):
         said += [
             f"Differences of {one.name}: {one.noise:.3g} of their deviations, or of values without one"
             if one.axis == "quantity"
-            else f"Noise of {one.name}: {one.noise:.3g} {one.unit}, "
+            else f"Noise of {one.name}: {_shown(one.noise, one.unit)}, "
             f"{100.0 * one.noise / float(np.std(one.measured)):.2g} % of the signal"
             for one in self.signals
         ]
@@ -257,7 +257,10 @@ class FitAnswer(ShortRepr, Reported):
         ]
         if len(self.starts) > 1:
             ends = ", ".join(f"{end:.6g}" for _, end in self.starts)
-            said.append(f"{len(self.starts)} starts ended at mean squares of differences over noise of {ends}")
+            said.append(
+                f"{len(self.starts)} starts ended with these mean squares of the differences over the noise (1: noise "
+                f"alone is left): {ends}"
+            )
         warned = []
         if self.rivals:
             listed = "; ".join(", ".join(f"{value:.6g}" for value in rival) for rival in self.rivals)
@@ -301,6 +304,11 @@ class FitAnswer(ShortRepr, Reported):
         fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."
         records = [asdict(one) for one in self.numbers]
         return Report(parts=(table, *said), facts=facts, records=records, index=("name",), warnings=warned, fault=fault)
+
+
+def _shown(value: float, unit: str) -> str:
+    factor, shown_unit = TABLE_UNITS.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {shown_unit}"
 
 
 def _row(one: FittedNumber) -> tuple[str, ...]:

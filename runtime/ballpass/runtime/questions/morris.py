@@ -99,7 +99,8 @@ class MorrisAnswer(ShortRepr, Reported):
                         for name, effect in ranked
                     ],
                     right=right,
-                    caption="changes over the whole of an input's distribution; size: mean without signs",
+                    caption="Changes over the whole of an input's distribution; size: mean without signs. A deviation "
+                    "near the size: the input acts together with others, or not linearly.",
                 )
             )
             records += [{"quantity": one.name, "input": name, **asdict(effect)} for name, effect in ranked]

@@ -206,9 +206,8 @@ class Optimum(ShortRepr, Reported):
             )
         checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts)
         said.append(f"slopes {'beside the kink ' if self.kinked else ''}by a second route: {checked}")
-        said.append(
-            f"{len(self.starts)} starts ended at {', '.join(f'{end:.7g}' for _, end in self.starts)} {self.unit}"
-        )
+        ends = ", ".join(f"{end:.7g}" for _, end in self.starts)
+        said.append(f"{len(self.starts)} start{'s' if len(self.starts) > 1 else ''} ended at {ends} {self.unit}")
         wrong = [name for name, verdict in self.verdicts if verdict == "disagrees"]
         broken = [one.quantity for one in self.limits if _over(one) > ACTIVE]
         fault = ""

@@ -17,6 +17,7 @@ from ballpass.runtime.contract.defaults import SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -110,13 +111,19 @@ class PoincareSection(ShortRepr, Reported):
             heads=("state", "least", "largest", "unit", *(("distance from the curve",) if fitted else ())),
             rows=[
                 (
-                    str(one["state"]),
-                    f"{one['least']:.6g}",
-                    f"{one['largest']:.6g}",
-                    str(one["unit"]),
+                    name,
+                    f"{factor * column.min():z.6g}",
+                    f"{factor * column.max():z.6g}",
+                    shown_unit,
                     *((f"{100.0 * share:.2g} %",) if fitted else ()),
                 )
-                for one, share in zip(records, missed.tolist(), strict=True)
+                for name, (factor, shown_unit), column, share in zip(
+                    self.names,
+                    [TABLE_UNITS.get(unit, (1.0, unit)) for unit in self.units],
+                    self.states.T,
+                    missed.tolist(),
+                    strict=True,
+                )
             ],
             right=("least", "largest", "distance from the curve")[: 3 if fitted else 2],
         )

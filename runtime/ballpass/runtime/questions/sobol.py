@@ -164,12 +164,16 @@ class SobolAnswer(ShortRepr, Reported):
             ]
             if ranked:
                 title = f"Shares in the variance of {one.name}, with 95 % intervals"
-                parts.append(ReportTable(title=title, heads=("input", *shares), rows=cells))
+                caption = (
+                    "Total: what is left of the variance where all other inputs are known. First-order: what it loses "
+                    "where this one is known."
+                )
+                parts.append(ReportTable(title=title, heads=("input", *shares), rows=cells, caption=caption))
             records += [{"quantity": one.name, "input": name, **asdict(s)} for name, s in ranked]
         for limit in self.limits:
             parts.append(
-                f"P({limit.words}) = {limit.share:.4g}, 95 % interval {limit.low:.4g} to {limit.high:.4g}: "
-                f"{limit.kept} of {limit.members}"
+                f"{limit.words}: kept by {limit.kept} of {limit.members} members, {100.0 * limit.share:.4g} % (95 % "
+                f"interval {100.0 * limit.low:.4g} to {100.0 * limit.high:.4g} %)"
             )
         warned = []
         if self.failed:

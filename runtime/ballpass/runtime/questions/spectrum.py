@@ -13,6 +13,7 @@ from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -177,12 +178,13 @@ class SignalSpectrum(ShortRepr, Reported):
         columns = 4 if any(self.alternatives) else 3
         infos = (*self.solution.manifest.states, *self.solution.manifest.outputs)
         words = next((info.description for info in infos if info.name == self.of), "")
-        height = f"{self.scaling} [{self.height_unit}]"
+        factor, height_unit = TABLE_UNITS.get(self.height_unit, (1.0, self.height_unit))
+        height = f"{self.scaling} [{height_unit}]"
         table = ReportTable(
             title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
             heads=(across, height, "line", "or (separated by)")[:columns],
             rows=[
-                (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name, others)[:columns]
+                (f"{self.position[k]:.6g}", f"{factor * self.height[k]:.4g}", name, others)[:columns]
                 for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
             ],
             right=(across, height),
@@ -193,9 +195,10 @@ class SignalSpectrum(ShortRepr, Reported):
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         said += [abbreviated] if abbreviated else []
+        factor, shown = TABLE_UNITS.get(self.unit, (1.0, self.unit))
         said.append(
-            f"rms {s.rms:.4g} {self.unit}, peak {s.peak:.4g} {self.unit}, crest factor {s.crest_factor:.3g}, kurtosis "
-            f"{s.kurtosis:.3g}, skewness {s.skewness:.3g}"
+            f"rms {factor * s.rms:.4g} {shown}, peak {factor * s.peak:.4g} {shown}, crest factor {s.crest_factor:.3g}, "
+            f"kurtosis {s.kurtosis:.3g}, skewness {s.skewness:.3g}"
         )
         if self.envelope is not None:
             low, high = self.envelope
@@ -253,13 +256,14 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
             speed = np.abs(np.interp(over_time.time, solution.t, rate)) / (2.0 * np.pi)
         yield "spectrogram", draw_spectrogram(over_time, orders, speed, title=title, unit=unit_words(found.unit))
         return
+    factor, shown = TABLE_UNITS.get(found.height_unit, (1.0, found.height_unit))
     figure = draw_lines(
         found.position,
-        found.height,
+        factor * found.height,
         found.marks,
         title=title,
         across="order of the shaft [1]" if found.orders else "frequency [Hz]",
-        up=label(f"{found.scaling} of {'the envelope of ' if band else ''}{words}", found.height_unit),
+        up=label(f"{found.scaling} of {'the envelope of ' if band else ''}{words}", shown),
         text=f"{found.window} window, lines {found.resolution:.3g}{'' if found.orders else ' Hz'} apart.",
     )
     yield "spectrum", figure

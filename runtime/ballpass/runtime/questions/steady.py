@@ -12,6 +12,7 @@ import numpy as np
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -167,7 +168,15 @@ class SteadyState(ShortRepr, Reported):
         table = ReportTable(
             title=f"State at t = 0 that repeats after {self.period:.10g} s{turns}",
             heads=("state", "start", "unit"),
-            rows=[(row["state"], f"{row['start']:z.10g}", row["unit"]) for row in rows],
+            rows=[
+                (name, f"{factor * start:z.10g}", shown_unit)
+                for name, (factor, shown_unit), start in zip(
+                    self.states,
+                    [TABLE_UNITS.get(unit, (1.0, unit)) for unit in self.units],
+                    self.start.tolist(),
+                    strict=True,
+                )
+            ],
             right=("start",),
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
@@ -175,12 +184,15 @@ class SteadyState(ShortRepr, Reported):
         told = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
         told += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
         parts: list[str | ReportTable] = [
-            f"{self.forcing}.",
+            f"{self.kind[0].upper()}{self.kind[1:]}: in a period a small disturbance becomes "
+            f"{abs(self.multipliers[0]):.4g} times as large.",
+            f"In a period {self.forcing}.",
             table,
-            f"multipliers: {told}",
+            f"Floquet multipliers, a factor of the disturbance a period for each direction: {told}",
             contact_words(self.contacts),
-            f"{self.kind}; Newton's iteration left {', '.join(f'{left:.1e}' for left in self.left)} of the magnitudes; "
-            f"{self.integrated} periods integrated, in {self.segments} segment{'s' if self.segments > 1 else ''}",
+            f"After each of Newton's iterations a period changed the state by "
+            f"{', '.join(f'{left:.1e}' for left in self.left)} of its magnitude; {self.integrated} periods integrated, "
+            f"in {self.segments} segment{'s' if self.segments > 1 else ''}",
         ]
         if self.sooner < self.repeats:
             parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperArgument, TyperCommand
+from typer.core import TyperArgument, TyperCommand, TyperOption
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
@@ -40,19 +40,21 @@ from ballpass.runtime.report.text import show as show_report
 
 
 class Command(TyperCommand):
-    """A command that asks for a missing argument as for everything else: what, what is allowed, what to write."""
+    """A command that asks for what is missing as for everything else: what, what is allowed, what to write."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as fault:
             missing = fault.param
-            if not isinstance(missing, TyperArgument) or fault.message:  # typer gives a missing argument no message
+            # what is missing has no message yet
+            if not isinstance(missing, (TyperArgument, TyperOption)) or fault.message:
                 raise
+            name = missing.metavar if isinstance(missing, TyperArgument) else missing.opts[0]
             words = missing.help or ""
             wanted = " ".join(str(each.metavar) for each in self.params if isinstance(each, TyperArgument))
             complain(
-                f"{self.name}: {missing.metavar} is missing. It takes: {words[:1].lower()}{words[1:]} "
+                f"{self.name}: {name} is missing. It takes: {words[:1].lower()}{words[1:]} "
                 f"Write: ballpass {self.name} {wanted}, then options; --help lists them."
             )
             raise typer.Exit(2) from None

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ballpass.runtime.app.commands.ranges import Range
-from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
+from ballpass.runtime.contract.units import TABLE_UNITS
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
