@@ -80,7 +80,8 @@ def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange) -> Repo
         for k, point in enumerate(branch.points):
             what = point.kind or {0: "first point", len(branch.points) - 1: "last point"}.get(k)
             value = f"{point.value / over.factor:.9g}"
-            largest = complex_words(complex(point.multipliers[0]))
+            first = complex(point.multipliers[0])
+            largest = f"{abs(first):.6g}, of a pair" if first.imag else complex_words(first)
             if what:
                 rows.append((str(branch.repeats), value, what, largest))
             if id(point) in listed:
