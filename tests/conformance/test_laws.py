@@ -9,6 +9,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import casadi as ca
@@ -24,6 +25,7 @@ from ballpass.derive.bearing.switching import Switching, find_switching
 from ballpass.derive.lowering.functions import lower
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.system import System
 from ballpass.runtime import Model
 from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.contract import read_manifest
@@ -45,6 +47,12 @@ NUMBERS = {STIFFNESS: 8.6e9, COEFFICIENT: 700.0, WIDTH: 0.05e-6, RATE_WIDTH: 1e-
 SMOOTH = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
 
 every_law = pytest.mark.parametrize("law", LAWS)
+
+
+@cache
+def system_of(law: str) -> System:
+    """Of the press with this law, derived once."""
+    return derive(scene_from_text(press(law, DAMPING[law]), "press"))
 
 
 def test_every_law_has_a_formula() -> None:
@@ -82,7 +90,7 @@ def along(axis: int, reach: float, count: int, fixed: float) -> np.ndarray:
 @every_law
 def test_the_force_is_that_of_its_formula(law: str) -> None:
     """Of the scene's own function, on both sides of the first contact and of rest."""
-    system = derive(scene_from_text(press(law, DAMPING[law]), "press"))
+    system = system_of(law)
     functions, p = lower(system, derivatives=False), [q.default for q in system.parameters]
     c = functions["constants"](p)
     constants = dict(zip((k.name for k in functions.constants), np.asarray(c).ravel(), strict=True))
@@ -127,7 +135,7 @@ def test_the_docs_and_the_manifest_say_how_smooth_it_is(law: str) -> None:
     """As its row in the page on damping has it; it jumps where its formula does; smoothed it is twice smooth."""
     page = (ROOT / "docs/theory/damping.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| `{law}` \|.* \| (\w+|–) \|$", page, re.MULTILINE)
-    declared = {name: s.value for name, s in derive(scene_from_text(press(law, DAMPING[law]), "press")).smoothness}
+    declared = {name: s.value for name, s in system_of(law).smoothness}
     assert declared.get("damping", "–") == row
     assert declared["elastic"] == "smooth"
     jump = abs(FORMULAS[law](1e-30, 1.0, 1e9, 1.0) - FORMULAS[law](-1e-30, 1.0, 1e9, 1.0))
