@@ -81,7 +81,7 @@ class Trade(Reported):
     def _report(self) -> Report:
         heads, rows = table(self, self.quantities[0])
         best = ReportTable(
-            title=f"{self.title}: {self.quantities[0]}, what no other way beats",
+            title=f"{self.title}: the fastest at each error of {self.quantities[0]}",
             heads=heads,
             rows=rows,
             right=heads[:-1],
@@ -128,7 +128,9 @@ def words(trade: Trade) -> list[str]:
             else:
                 said.append(f"{percent(target)} on {name}: {milliseconds(one.time)} a cycle ({one.way.words}).")
     known = ", ".join(f"{name} {percent(value)}" for name, value in trade.uncertainty.items())
-    said.append(f"The reference, two methods that agree, is known to: {known}. Nothing below is claimed.")
+    said.append(
+        f"The reference, two methods that agree, is known to: {known}. Smaller errors cannot be measured with it."
+    )
     return said + _located(trade)
 
 
