@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from ballpass.derive.features import cost
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Explanation, Manifest, Model
+from ballpass.runtime import Explanation, Manifest, Model, RequestError, load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.explain import _report
 from ballpass.runtime.point.explain import _knot
@@ -138,6 +138,10 @@ def test_a_mechanism_without_bearings_is_explained(tmp_path: Path, monkeypatch: 
     done = CliRunner().invoke(app, ["explain", str(scene), "--json"])
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout)["states"] == []
+    linkage = load(tmp_path / "generated/linkage")
+    with pytest.raises(RequestError, match=r"nothing in this scene moves freely.* quantities"):
+        linkage.reduce()  # it advised to write the folder again
+    assert math.isfinite(linkage.quantities(["max:reaction.A.x"])["max:reaction.A.x"].value)
 
 
 def test_hertz_is_not_called_smooth_where_people_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -167,6 +167,11 @@ class LoadedModel(CompiledFunctions):
         """What to say where the stepper is asked for and cannot be had."""
         if not self.compiled:
             return without_compiler("The project's own stepper")
+        if not self.states:
+            return (
+                "This integrates, and nothing in this scene moves freely: all follows from the driver's angle. Ask for "
+                "samples (simulate) or for quantities (quantities, ballpass run --of)."
+            )
         return (
             f"This needs the project's own stepper: the folder {self.folder} has no kernels for it. Write the folder "
             "again with `ballpass derive`, or run the model with method cvodes, for samples."
