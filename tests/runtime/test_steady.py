@@ -114,6 +114,10 @@ def test_the_doubling_is_where_an_independent_solver_has_it_and_its_branch_is_fo
     base, twice = found.branches
     assert [point.kind for point in base.special] == ["period doubling", "period doubling"]
     assert base.special[0].value / RPM == pytest.approx(1961.14639, abs=2e-5)
+    last = base.points[-1]
+    assert last.value / RPM == pytest.approx(1972.0, rel=1e-12)  # the range's end, not a point beyond it
+    there = rotor.steady(parameters={"shaft.speed": 1972.0 * RPM})
+    assert last.multipliers == pytest.approx(there.multipliers, abs=1e-6)
     assert twice.repeats == 2
     assert all(point.stable for point in twice.points)
     assert "meets the branch" in twice.ended

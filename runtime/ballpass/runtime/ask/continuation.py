@@ -158,13 +158,17 @@ def follow(
             if before is not None and before @ apart < 0.0:
                 ended = "where it meets the branch of half the period"
                 break
-        found += _changes(path, now, then, step)
-        found.append(path.point(then, ""))
+        found += [point for point in _changes(path, now, then, step) if path.holds(point.value)]
         if progress is not None:
             progress(min(max(float(then.y[-1]), 0.0), 1.0))
         if not 0.0 <= then.y[-1] <= 1.0:
-            ended = "at the end of the range"
+            try:
+                found.append(path.point(path.at_end(now, then), ""))
+                ended = "at the end of the range"
+            except SimulationError:
+                ended = "a step before the end of the range, at which no state was found"
             break
+        found.append(path.point(then, ""))
         step = min(step * (1.5 if then.iterations <= 3 else 0.7 if then.iterations > 5 else 1.0), LARGEST_STEP)
         now = then
     return SteadyBranch(repeats=shooting.repeats, points=tuple(found), ended=ended)
@@ -203,6 +207,10 @@ class _Path:
 
     def states(self, y: np.ndarray) -> tuple[np.ndarray, float]:
         return y[:-1].reshape(self.shape) * self.shooting.magnitude, self.low + self.width * float(y[-1])
+
+    def holds(self, value: float) -> bool:
+        """Whether the range does."""
+        return 0.0 <= (value - self.low) / self.width <= 1.0
 
     def matrix(self, residual: Residual) -> np.ndarray:
         return np.column_stack([residual.by_states, residual.by_parameter * self.width])
@@ -243,6 +251,20 @@ class _Path:
                 return _Found(now, found.residual, found.tangent, iteration)
             before = size
         raise SimulationError("steady: no point of the branch was found across a step.")
+
+    def at_end(self, now: _Found, then: _Found) -> _Found:
+        """The point at the end of the range that a step passes.
+
+        Raises
+        ------
+        SimulationError
+            No point was found there.
+        """
+        step = then.y - now.y
+        end = min(max(float(then.y[-1]), 0.0), 1.0)
+        along = np.zeros(len(step))
+        along[-1] = np.sign(step[-1])
+        return self.corrected(now.y + (end - now.y[-1]) / step[-1] * step, along, 0.0)
 
     def point(self, found: _Found, kind: str) -> BranchPoint:
         nodes, value = self.states(found.y)
