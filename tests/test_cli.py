@@ -172,7 +172,6 @@ def test_results_are_the_files_that_were_promised(site: Site) -> None:
     assert summary["reaction.A.y"]["max"] >= solution.steady()["reaction.A.y"].max()
 
 
-@pytest.mark.long
 def test_a_second_run_gives_the_same_numbers(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
     result = ballpass(site.folder, "run", SCENES / "four_bar.toml", "--json", "--no-figures", "--out", tmp_path)
     again, first = json.loads(result.stdout), site.summary("four_bar")
@@ -201,7 +200,6 @@ def test_without_json_a_table_and_the_place_of_the_results_are_printed(
 
 
 @pytest.mark.usefixtures("refusing")
-@pytest.mark.long
 def test_other_numbers_derive_nothing_and_compile_nothing(
     site: Site, ballpass: Callable[..., Result], tmp_path: Path
 ) -> None:
@@ -234,7 +232,6 @@ def test_the_refusing_compiler_would_have_been_noticed(
 
 
 @pytest.mark.usefixtures("refusing")
-@pytest.mark.long
 def test_set_equals_the_same_value_in_the_file(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
     plain = ("--json", "--no-figures", "--out", tmp_path / "results")
     by_set = ballpass(site.folder, "run", SCENES / "punching_press.toml", *plain, "--set", "bearing.clearance=20e-6 m")

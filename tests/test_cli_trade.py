@@ -26,7 +26,6 @@ def scene(site: Path) -> None:
     (site / f"{NAME}.toml").write_text(short, encoding="utf-8")
 
 
-@pytest.mark.long
 def test_a_trade_prints_what_an_error_costs_and_leaves_figures(ballpass: Callable[..., Result], site: Path) -> None:
     done = ballpass("trade", f"{NAME}.toml", "--members", "3")
     assert done.exit_code == 0, done.output

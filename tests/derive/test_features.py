@@ -38,7 +38,6 @@ def test_every_feature_adds_operations_where_it_acts_and_none_where_it_does_not(
             assert added["kernel.stage"] > 0
 
 
-@pytest.mark.long
 def test_parts_are_counted_whose_outputs_nobody_could_ask_for_without_them(scene_text: Callable[..., str]) -> None:
     """Outputs on request of linkage, gravity and damping, and a pattern of two parts."""
     outputs = ("point.slider.C.ay", "weight.power", "contact.loss", "*.power")

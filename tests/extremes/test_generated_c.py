@@ -112,7 +112,7 @@ def sanitized(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]
     return run
 
 
-@pytest.mark.parametrize("fault", [pytest.param("", marks=pytest.mark.long), BEYOND], ids=["without", "with"])
+@pytest.mark.parametrize("fault", ["", BEYOND], ids=["without", "with"])
 def test_sanitizers_see_a_planted_fault(
     sanitized: Callable[..., subprocess.CompletedProcess[str]], folder: Path, tmp_path: Path, fault: str
 ) -> None:

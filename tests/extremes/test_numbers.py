@@ -166,8 +166,9 @@ EXTREMES = (
 )
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=_marks(law, ("two-sided-gated",))) for law in LAWS]
+)  # fmt: skip
 def test_every_damping_law_moves_as_written_by_hand(press: Press, holds: Holds, law: str) -> None:
     """Every damping law with the shipped coefficient, against SciPy on the press written by hand."""
     options: dict[str, Any] = {"turns": 0.1, "rtol": 1e-10, "tight": 1e-11} if law == "none" else {}

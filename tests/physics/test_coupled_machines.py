@@ -126,14 +126,7 @@ def pair(name: str) -> tuple[Derived, Multibody]:
 
 
 #: Second cases of what another one has as well; their systems are large.
-SECOND = (
-    "press, effects",
-    "press, effects, run-up",
-    "press, effects, outer ring on the crank",
-    "drag link",
-    "toggle press",
-    "Whitworth",
-)
+SECOND = ("press, effects", "press, effects, run-up", "press, effects, outer ring on the crank", "drag link")
 
 
 @pytest.mark.parametrize(

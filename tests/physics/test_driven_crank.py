@@ -80,7 +80,6 @@ def test_andrews_squeezer_comes_to_the_published_end(andrews: Model) -> None:
         assert float(end[name][-1]) == pytest.approx(value, abs=1e-7), name
 
 
-@pytest.mark.long
 def test_kinetic_energy_of_a_slider_crank_and_its_sensitivities_are_those_of_idas(tmp_path: Path) -> None:
     """G, dG/dk and dG/dc of SUNDIALS' example idasSlCrank_FSA_dns, by the project's own forward sensitivities."""
     path = tmp_path / "slider_crank.toml"

@@ -81,7 +81,6 @@ def test_settling_drops_the_start(plain: Model) -> None:
     assert found.reductions["ball.force"].maximum == pytest.approx(steady, rel=1e-3)
 
 
-@pytest.mark.long
 def test_run_warns_of_an_extreme_in_its_first_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "falling.toml").write_text(FOUR + CONCENTRIC + RUN, encoding="utf-8")

@@ -23,8 +23,7 @@ def table(angles: list[float], forces: list[float], more: str = "") -> tuple[tup
     return FORCE, (WINDOW, text)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("scene", ["punching_press", "punching_press_motor"])
+@pytest.mark.parametrize("scene", ["punching_press", pytest.param("punching_press_motor", marks=pytest.mark.long)])
 def test_two_equal_turns_are_one_and_others_differ(make_virtual: Callable[..., Model], scene: str) -> None:
     both = [*ANGLES, *(angle + 360.0 for angle in ANGLES)]
     one = make_virtual(scene, *table(ANGLES, FORCES))

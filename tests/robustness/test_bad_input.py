@@ -439,7 +439,7 @@ def rotor_model(rotor: Path) -> Callable[[str], Path]:
     return make
 
 
-WORDS = ("int", *(("clean", "main", "run", "NULL", "all", "Makefile", "stepper", "casadi_real") if LONG else ()))
+WORDS = ("int", "clean", *(("main", "run", "NULL", "all", "Makefile", "stepper", "casadi_real") if LONG else ()))
 
 
 @pytest.mark.parametrize("word", WORDS)

@@ -393,7 +393,6 @@ def test_an_interrupt_that_python_turns_into_something_else_is_one(where: str, c
     assert found.stderr == ("error: interrupted. Files written so far are complete.\n" if code else "")
 
 
-@pytest.mark.long
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     cache: Path, scene: Path, tmp_path: Path
 ) -> None:
@@ -530,7 +529,6 @@ def test_without_any_program_on_the_path_the_model_runs_in_the_virtual_machine(s
     assert '"compiled": false' in out
 
 
-@pytest.mark.long
 def test_two_processes_on_one_cold_cache_both_get_the_right_library(cache: Path, rotor: Path) -> None:
     code = """
         import sys

@@ -208,7 +208,6 @@ def test_links_and_permissions_of_a_folder_stay(tmp_path: Path, runs: tuple[Path
     assert target.stat().st_mode & 0o777 == 0o750
 
 
-@pytest.mark.long
 def test_a_reader_beside_a_writer_gets_one_run(
     tmp_path: Path, runs: tuple[Path, Path], solutions: list[Solution]
 ) -> None:

@@ -204,7 +204,6 @@ def test_words_of_a_scene_end_no_element(make_virtual: Callable[..., Model]) -> 
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
 
 
-@pytest.mark.long
 def test_a_movie_and_a_page_begin_with_the_bearing_that_is_named(
     make_virtual: Callable[..., Model], scene_text: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -58,9 +58,7 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
     return all(np.array_equal(a[name][rows], b[name], equal_nan=True) for name in b)
 
 
-@pytest.mark.parametrize(
-    "law", ["tangent", *(pytest.param(law, marks=pytest.mark.long) for law in ("one-sided", "stiff"))]
-)
+@pytest.mark.parametrize("law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long), "tangent"])
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str) -> None:
     """Of ``auto``, stepped over; by one method, lanes are the bits of single runs (conformance/test_lanes.py)."""
     model, columns = press(make_model, law), table(11)
@@ -151,7 +149,6 @@ def test_members_at_loose_tolerances_advance_in_lanes(make_model: ModelMaker, rt
     assert (found.statistics.kinks, found.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
 
 
-@pytest.mark.long
 def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker) -> None:
     model = make_model("varying_compliance", ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n'))
     columns = {"bearing.clearance": [5e-6, 1e-5]}
@@ -460,7 +457,6 @@ def test_segments_made_for_many_are_those_made_for_one(make_model: ModelMaker, t
     assert_segments_of_one(model, members, Span(durations=turns * length, turns=length, starts=transient * length))
 
 
-@pytest.mark.long
 def test_segments_of_fast_loads_on_slow_shafts_are_those_made_for_one(make_model: ModelMaker) -> None:
     """Where a phase gets large within a turn, the turn is cut."""
     wave = (

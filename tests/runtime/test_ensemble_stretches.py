@@ -195,7 +195,7 @@ def test_a_member_has_its_own_limit_of_steps(
     assert fates[0] == fates[1]
 
 
-@pytest.mark.parametrize("lanes", [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.parametrize("lanes", [True, False])
 @pytest.mark.parametrize(("members", "cycles"), [(8, 200), (200, 8)], ids=["few long", "many short"])
 def test_progress_is_told_within_chunks(
     make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, lanes: bool, members: int, cycles: int
@@ -242,7 +242,6 @@ def test_members_interrupted_between_stretches_have_no_results(make_model: Model
     assert np.all(np.isnan(found["max:ball.force"]))
 
 
-@pytest.mark.long
 def test_the_end_of_a_stretch_is_not_that_of_the_run(make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked to stop when all have come to the end of their first stretch: only who needs no other one has results."""
     model = press(make_model)

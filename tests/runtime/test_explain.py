@@ -111,7 +111,6 @@ def test_a_constant_load_has_one_state_of_rest(make_model: Callable[..., Model])
     assert [s.name for s in make_model("punching_press").explain().scales] == ["lightest load", "heaviest load"]
 
 
-@pytest.mark.long
 def test_shares_of_the_right_hand_side_and_the_rest_are_all_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,8 +33,8 @@ from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
 SHORT, LONG = (
-    ("punching_press",),
-    ("varying_compliance", "punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
+    ("punching_press", "varying_compliance"),
+    ("punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
 )
 MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
@@ -144,7 +144,7 @@ def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:
         ),
         pytest.param("punching_press_tangent", (), "1e-8", marks=pytest.mark.long),
         pytest.param("four_bar", (), "1e-7", marks=[pytest.mark.long, pytest.mark.extreme]),
-        pytest.param("varying_compliance", (), "1e-9", marks=pytest.mark.long),
+        ("varying_compliance", (), "1e-9"),
     ],
 )
 def test_program_locates_kinks_as_the_model_does(
@@ -206,7 +206,7 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
         ("four_bar", {"mechanism.torques.work.window.start": 5.6, "mechanism.torques.work.window.end": 0.9}),
         ("four_bar", {"mechanism.driver.speed": -55.0, "mechanism.driver.start_angle": 2.5}),
         # edges shared by both windows, at the start and at whole turns
-        pytest.param(
+        (
             "offset_slider",
             {
                 "mechanism.forces.tool.window.start": 0.0,
@@ -214,7 +214,6 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
                 "mechanism.forces.strip.window.start": 4.0,
                 "mechanism.forces.strip.window.end": 6.283185307179586,
             },
-            marks=pytest.mark.long,
         ),
         # a window without width, and a clearance that changes the derived constants' neighbours
         ("offset_slider", {"mechanism.forces.tool.window.end": 4.014257279586958, "bearing.clearance": 4e-6}),
@@ -329,9 +328,7 @@ HARMONIC = (
         ("four_bar", (), {"mechanism.driver.speed": 300.0}),
         ("offset_slider", (), {"bearing.clearance": 60e-6}),
         ("varying_compliance", (), {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3}),
-        pytest.param(
-            "varying_compliance", HARMONIC, {"load.amplitude.x": 2000.0, "shaft.speed": 400.0}, marks=pytest.mark.long
-        ),
+        ("varying_compliance", HARMONIC, {"load.amplitude.x": 2000.0, "shaft.speed": 400.0}),
     ],
 )
 @pytest.mark.parametrize(

@@ -80,7 +80,6 @@ def texts(figure: Figure) -> str:
     return " ".join([*written, caption_of(figure)]).replace("\n", " ").replace("\u00a0", " ")
 
 
-@pytest.mark.long
 def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp_path: Path) -> None:
     first = draw_all(*press, tmp_path / "a")
     assert [path.name for path in first] == [*(f"{name}.png" for name in NAMES), CAPTIONS]
@@ -126,7 +125,6 @@ def test_dollars_in_a_scene_s_title_are_no_formula(put: Callable[[Figure, str, s
     assert save(figure, tmp_path / "a.png").is_file()
 
 
-@pytest.mark.long
 def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:
     assert [path.stem for path in draw_all(*shaft, tmp_path)][:-1] == [*NAMES[1:]]
 
@@ -358,7 +356,6 @@ def test_applied_force_has_the_components_of_the_scene(
     assert force == pytest.approx(expected)
 
 
-@pytest.mark.long
 def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Callable[..., Model]) -> None:
     """On a lug of the slider, and as the table falls from 1000 N at 0 to -1000 N at 180 degrees, to the other side."""
     table = 'table = { angle = ["0 deg", "180 deg"], force = ["1000 N", "-1000 N"] }\ndirection = "30 deg"'
@@ -450,7 +447,6 @@ def test_a_motor_s_torque_turns_around_its_joint_and_the_punch_acts_in_its_windo
     assert senses == {-1.0, 1.0}
 
 
-@pytest.mark.long
 def test_a_load_curve_covers_all_turns_of_a_force_s_table(make_model: Callable[..., Model]) -> None:
     """A four-stroke engine fires in one turn of two: the last turn alone may show the other one."""
     model = make_model("engine")

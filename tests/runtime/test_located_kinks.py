@@ -184,7 +184,7 @@ def test_a_step_that_looks_for_the_end_of_a_contact_stays_within_its_run(hertz: 
         assert (outcome.time, outcome.kinks) == (end, 0)
 
 
-@pytest.mark.parametrize("law", ["hertz", pytest.param("tangent", marks=pytest.mark.long)])
+@pytest.mark.parametrize("law", ["hertz", "tangent"])
 def test_contacts_cost_a_few_steps_and_not_a_cascade(request: pytest.FixtureRequest, law: str) -> None:
     """A ring bounces on turning balls.  At a tight tolerance steps of its own clock enter and leave each contact.
 
@@ -462,7 +462,6 @@ def test_smoothed_laws_have_no_kinks_and_pay_for_none(make_model: Make, tmp_path
     assert (located.statistics.kinks, located.statistics.located) == ("located", 0)
 
 
-@pytest.mark.long
 def test_opposite_balls_take_the_kink_of_one_sided_damping_out_of_the_motion(make_model: Make) -> None:
     """Preloaded, eight balls have nothing to locate, seven do."""
     changes = (*STANDING[1:], ONE_SIDED, ('clearance = "0 um"', 'clearance = "-20 um"'))

@@ -78,7 +78,7 @@ def test_reference_does_not_depend_on_its_method(press: Make, name: str) -> None
 
 
 @pytest.mark.parametrize("name", [SCENES[0], pytest.param(SCENES[1], marks=pytest.mark.long)])
-@pytest.mark.parametrize("method", [*(pytest.param(name, marks=pytest.mark.long) for name in OF_CASADI), "stepper"])
+@pytest.mark.parametrize("method", METHODS)
 def test_motion_converges_to_the_hand_written_press(press: Make, name: str, method: str) -> None:
     model = press(name)
     needs(model, method)

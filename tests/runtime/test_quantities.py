@@ -26,7 +26,6 @@ def values(model: Model, of: list[str], **options: object) -> dict[str, float]:
     return {item.name: item.value for item in report.quantities}
 
 
-@pytest.mark.long
 def test_names_mean_the_numbers_of_ensembles(make_model: Callable[..., Model]) -> None:
     """Nodes and panels here, reductions inside the stepper's steps there.
 
@@ -89,7 +88,7 @@ def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[...
         assert report[key].check.verdict.value == "verified"
 
 
-@pytest.mark.parametrize("start_angle", [pytest.param(0.0, marks=pytest.mark.long), 4.5])
+@pytest.mark.parametrize("start_angle", [0.0, 4.5])
 def test_static_quantities_are_those_of_the_static_query_in_the_first_turn(
     make_model: Callable[..., Model], start_angle: float
 ) -> None:
@@ -134,7 +133,6 @@ def test_a_parameter_that_is_zero_has_no_elasticity_and_is_ranked_by_its_effect(
     assert "+0.0000" not in line
 
 
-@pytest.mark.long
 def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]) -> None:
     """Heavy preload makes the contacts linear: the outer ring on its housing then answers a constant load, and the
     amplitude at an order of the shaft falls with the housing's stiffness as the static compliance does."""
@@ -165,7 +163,6 @@ def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Mod
     assert fine.t[-1] == pytest.approx(turn)
 
 
-@pytest.mark.long
 def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> None:
     """Parseval: mean square about the mean is half the sum of squares of the harmonics' amplitudes."""
     model = make_model("four_bar")

@@ -120,7 +120,6 @@ def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFun
         getattr(lenient, call)(table)  # a warning would be an error: it is said once
 
 
-@pytest.mark.long
 def test_what_is_known_is_given_beside_what_is_not(smooth: Model) -> None:
     """At twice the speed the run of 0.8 turns is over before the time that is asked for."""
     known, beyond = ("rms:inner.y", "static_deflection@240deg"), "value:inner.y@0.08s"
@@ -175,7 +174,6 @@ def test_derivatives_by_the_speed_are_known_as_others_are(smooth: Model) -> None
     np.testing.assert_allclose(usual.jacobian(usual.start), fine.jacobian(fine.start), rtol=2e-3)
 
 
-@pytest.mark.long
 def test_derivatives_that_mean_nothing_are_refused(
     press: Model, smooth: Model, function: QuantityFunction, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -224,7 +222,6 @@ def test_jax_finds_derivatives_right(smooth: Model, jax: ModuleType) -> None:
     )  # fmt: skip
 
 
-@pytest.mark.long
 def test_jax_transforms_give_the_same_bits(jax: ModuleType, function: QuantityFunction, rows: np.ndarray) -> None:
     f, some = in_jax(function), rows[:2]
     expected, slopes = function(some), function.jacobian(some)

@@ -223,7 +223,6 @@ def test_reductions_do_not_change_the_run(make_model: ModelMaker, one_library: C
     assert found.steps == run.statistics.steps
 
 
-@pytest.mark.long
 def test_memory_does_not_grow_with_the_run(make_model: ModelMaker) -> None:
     model = press(make_model, "stiff")
     model.reduce(cycles=2, transient=1)

@@ -67,7 +67,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
 
 
 @pytest.mark.parametrize("kinks", ["stepped-over", "located"])
-@pytest.mark.parametrize("law", ["tangent", pytest.param("two-sided-gated", marks=pytest.mark.long)])
+@pytest.mark.parametrize("law", ["tangent", "two-sided-gated"])
 @pytest.mark.parametrize("method", STEPPERS)
 def test_a_run_has_the_same_bits_however_it_is_cut_into_calls(
     make_model: ModelMaker, law: str, method: str, kinks: str

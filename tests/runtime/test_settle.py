@@ -35,7 +35,6 @@ def test_settled_peaks_do_not_depend_on_the_ball_angle(make_model: object) -> No
     assert np.ptp(rms) < MEANS * np.mean(rms)
 
 
-@pytest.mark.long
 def test_twice_the_turns_change_a_settled_run_by_less_than_it_says(press: Model) -> None:
     found = press.settle()
     assert found.settled

@@ -185,7 +185,6 @@ def test_without_kinks_errors_fall_with_the_tolerance(make_model: Make, method: 
     assert all(tight < max(loose / 12, 2e-7) for loose, tight in pairwise(middle)), middle
 
 
-@pytest.mark.long
 def test_families_agree_among_each_other(make_model: Make) -> None:
     """On the crank-shaper, which magnifies errors more than the scenes above."""
     model = make_model("crank_shaper")
