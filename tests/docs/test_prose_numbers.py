@@ -224,10 +224,6 @@ NAMED: dict[str, dict[str, str]] = {
         "25.588 µm and 41.406 µm": "test_spalls.py",
         "a chord of 1 mm in a 6204": "what test_spalls.py measures",
         "a rotor with 8 balls": "the 6204 of rotor.toml",
-        "takes 1.2, 1.9, 2.6 and 4.5 times as long": "processor times, least of 7, waves of 0.1 nm; not repeated",
-        "a run of 60 turns": "likewise",
-        "11 times as long with 50 orders": "likewise",
-        "takes 1.6 times as long": "adr/0033",
     },
     "docs/theory/errata.md": {
         "bottom dead centre is at 270°, the window ends 3° before it": "geometry",

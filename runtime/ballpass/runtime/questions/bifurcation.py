@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 #: Longest period of the equations that is taken between readings, in turns; else it is one turn.
 LONGEST_STROBE = 8.0
 
-
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
 

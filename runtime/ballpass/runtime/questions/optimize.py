@@ -38,7 +38,6 @@ BESIDE = 5e-3
 #: Slopes of the search and of the check agree within this share [1].
 AGREES = 1e-3
 
-
 #: Most tolerances; points within their box, beside its corners, of which the worst is taken; further ones that check.
 MOST_TOLERANCES, WITHIN, FURTHER = 6, 15, 256
 

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.invariant_curve import InvariantCurve
 
-
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
 ON_CURVE = 0.02

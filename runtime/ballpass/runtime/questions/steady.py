@@ -41,7 +41,6 @@ SEGMENTS, KICKS = 8, (1e-3, 1e-2, 0.03, 0.1, 0.3)
 #: Moments at which the equations are compared.
 MOMENTS = 40
 
-
 Turns = Annotated[
     float | None,
     Option(
