@@ -27,7 +27,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.reduction_rows import why_void
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
@@ -176,7 +176,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
             continue
         unit, (peak, mean) = summary[entry]["unit"], longer.changes.get(name, (0.0, 0.0))
         added[entry] = added.get(entry, {}) | _numbers(entry, unit, **numbers)
-        factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+        factor, shown = table_unit(unit)
         for kind, value in numbers.items():
             before = summary[entry][kind]
             # the highest force comes first, changed or not

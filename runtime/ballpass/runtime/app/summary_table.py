@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.summary_words import row_place, row_words
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.report.report import ReportTable
 
@@ -59,7 +59,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
-        factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
+        factor, unit = table_unit(item["unit"])
         if name.startswith("point."):  # the size of a machine, not of a clearance
             factor, unit = 1e3, "mm"
         dust = rounding.get(item["unit"], 0.0)
@@ -123,7 +123,7 @@ def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
     """Quantities of ``--of``."""
     rows = []
     for name, one in found.items():
-        factor, unit = TABLE_UNITS.get(one.unit, (1.0, one.unit))
+        factor, unit = table_unit(one.unit)
         time = "" if one.time is None else f"t = {one.time:.6g} s"
         ball = "" if one.ball is None else f"ball {one.ball}"
         rows.append((name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
@@ -135,7 +135,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
     rows = []
     for name in accuracy.of:
         unit = parse_quantity(model.manifest, name).unit
-        factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
+        factor, unit = table_unit(unit)
         value, error = accuracy.values[name], accuracy.estimates[name]
         # no more digits than the error allows
         digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1

@@ -12,7 +12,7 @@ from ballpass.runtime.app.summary_words import inside, row_words
 from ballpass.runtime.certify.growth import largest_first
 from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
@@ -76,7 +76,7 @@ def _start_words(model: Model, longer: Settled) -> str:
     names = sorted(longer.first, key=lambda name: "ball." not in name)
     kind, time, value, later = longer.first[names[0]]
     _, unit = channels_of(model.manifest)[names[0]]
-    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown = table_unit(unit)
     length = longer.reductions.cycle_length
     turn = "" if length is None else f", in turn {int(time / length) + 1}"
     more = f", and {len(names) - 1} more" if len(names) > 1 else ""

@@ -31,7 +31,7 @@ from functools import lru_cache
 from ballpass.runtime.contract.errors import RequestError
 
 #: Unit of a number in a file -> factor and unit in tables and figures, where six digits of a displacement are six then.
-TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+_TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 
 #: Longest text read as a quantity; the longest sensible one has some thirty characters.
 MAX_LENGTH = 100
@@ -98,6 +98,11 @@ class GrammarError(Exception):
     def __init__(self, problem: str, remedy: str) -> None:
         super().__init__(problem)
         self.problem, self.remedy = problem, remedy
+
+
+def table_unit(unit: str) -> tuple[float, str]:
+    """Factor and unit of a number in tables and figures."""
+    return _TABLE_UNITS.get(unit, (1.0, unit))
 
 
 def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> float:

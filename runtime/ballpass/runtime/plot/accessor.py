@@ -14,7 +14,7 @@ import numpy as np
 from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.animate import animation_page, write_animation
 from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.show import html
@@ -286,7 +286,7 @@ def _read_in(unit: str) -> tuple[float, str]:
     need("matplotlib")
     from ballpass.runtime.plot.style import unit_words
 
-    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown = table_unit(unit)
     return factor, unit_words(shown)
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ballpass.runtime.ask.parameter_range import ParameterRange
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, INK, PALE, SIGNAL, caption, label, new_figure, styled
 
 #: Shades of the kinds of motion; what is periodic has none.
@@ -36,7 +36,7 @@ def draw_bifurcation(
     figure = new_figure(6.4 if exponents else 4.4)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0)) if exponents else [figure.add_subplot()]
     above = panels[0]
-    factor, shown_unit = TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown_unit = table_unit(unit)
     # dots of few values stand apart and may be larger: the red ones within the blue ones
     wide = min(max(80.0 / len(up), 1.0), 3.0)
     for motions, colour, size, words in ((up, INK, 4.0 * wide, "up"), (down, SIGNAL, 1.5 * wide, "down")):

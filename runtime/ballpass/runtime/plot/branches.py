@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.continuation import KINDS, SteadyBranch
 from ballpass.runtime.ask.parameter_range import ParameterRange
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, INK, MANY, SIGNAL, caption, label, new_figure, styled
 
 #: Markers of the points at which the kind of the states changes.
@@ -39,7 +39,7 @@ def draw_branches(branches: Sequence[SteadyBranch], over: ParameterRange, state:
     """The first state at t = 0 and the largest multiplier over the parameter; unstable states are dashed."""
     figure = new_figure(6.2)
     above, below = figure.subplots(2, 1, sharex=True)
-    factor, shown_unit = TABLE_UNITS.get(state_unit, (1.0, state_unit))
+    factor, shown_unit = table_unit(state_unit)
     for branch, look in zip(branches, MANY, strict=False):
         values = np.array([point.value / over.factor for point in branch.points])
         heights = factor * np.array([point.nodes[0, 0] for point in branch.points])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import FIRST, GREY, INK, SIGNAL, caption, label, new_figure, styled
 
 #: Lags of the correlation that are shown.
@@ -33,7 +33,7 @@ def draw_residuals(
         axis
     ]
     dot = 2.0 if axis == "time" else 6.0
-    factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown = table_unit(unit)
     above.plot(t, factor * measured, ".", color=GREY, markersize=dot, label="measured", rasterized=True)
     line = {"linewidth": 0.9} if axis != "quantity" else {"linestyle": "none", "marker": "x"}
     above.plot(t, factor * model, **{**FIRST, **line}, label="model")

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.invariant_curve import InvariantCurve
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import INK, SIGNAL, caption, label, new_figure, styled
 
 #: Points along the curve.
@@ -43,7 +43,7 @@ def draw_section(
     half = len(names) // 2
     # a coordinate is shown over its rate, whichever of the two was named
     place, rate = row % half, row % half + half
-    scales = [TABLE_UNITS.get(unit, (1.0, unit)) for unit in units]
+    scales = [table_unit(unit) for unit in units]
     factors, shown = np.array([factor for factor, _ in scales]), [unit for _, unit in scales]
     points = {"color": INK, "marker": "o", "markersize": 2.6, "linestyle": "none", "markeredgewidth": 0}
     heights = factors * states

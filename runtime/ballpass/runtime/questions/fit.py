@@ -14,7 +14,7 @@ from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
-from ballpass.runtime.contract.units import TABLE_UNITS, QuantityError, parse_quantity
+from ballpass.runtime.contract.units import QuantityError, parse_quantity, table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -307,7 +307,7 @@ class FitAnswer(ShortRepr, Reported):
 
 
 def _shown(value: float, unit: str) -> str:
-    factor, shown_unit = TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown_unit = table_unit(unit)
     return f"{factor * value:.3g} {shown_unit}"
 
 

@@ -17,7 +17,7 @@ from ballpass.runtime.contract.defaults import SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -118,7 +118,7 @@ class PoincareSection(ShortRepr, Reported):
                 )
                 for name, (factor, shown_unit), column, share in zip(
                     self.names,
-                    [TABLE_UNITS.get(unit, (1.0, unit)) for unit in self.units],
+                    map(table_unit, self.units),
                     self.states.T,
                     missed.tolist(),
                     strict=True,

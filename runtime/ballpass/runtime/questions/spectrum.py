@@ -13,7 +13,7 @@ from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -178,7 +178,7 @@ class SignalSpectrum(ShortRepr, Reported):
         columns = 4 if any(self.alternatives) else 3
         infos = (*self.solution.manifest.states, *self.solution.manifest.outputs)
         words = next((info.description for info in infos if info.name == self.of), "")
-        factor, height_unit = TABLE_UNITS.get(self.height_unit, (1.0, self.height_unit))
+        factor, height_unit = table_unit(self.height_unit)
         height = f"{self.scaling} [{height_unit}]"
         table = ReportTable(
             title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
@@ -195,7 +195,7 @@ class SignalSpectrum(ShortRepr, Reported):
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         said += [abbreviated] if abbreviated else []
-        factor, shown = TABLE_UNITS.get(self.unit, (1.0, self.unit))
+        factor, shown = table_unit(self.unit)
         said.append(
             f"rms {factor * s.rms:.4g} {shown}, peak {factor * s.peak:.4g} {shown}, crest factor {s.crest_factor:.3g}, "
             f"kurtosis {s.kurtosis:.3g}, skewness {s.skewness:.3g}"
@@ -256,7 +256,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
             speed = np.abs(np.interp(over_time.time, solution.t, rate)) / (2.0 * np.pi)
         yield "spectrogram", draw_spectrogram(over_time, orders, speed, title=title, unit=unit_words(found.unit))
         return
-    factor, shown = TABLE_UNITS.get(found.height_unit, (1.0, found.height_unit))
+    factor, shown = table_unit(found.height_unit)
     figure = draw_lines(
         found.position,
         factor * found.height,

@@ -12,7 +12,7 @@ import numpy as np
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -171,7 +171,7 @@ class SteadyState(ShortRepr, Reported):
                 (name, f"{factor * start:z.10g}", shown_unit)
                 for name, (factor, shown_unit), start in zip(
                     self.states,
-                    [TABLE_UNITS.get(unit, (1.0, unit)) for unit in self.units],
+                    map(table_unit, self.units),
                     self.start.tolist(),
                     strict=True,
                 )

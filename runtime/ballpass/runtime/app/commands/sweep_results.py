@@ -16,7 +16,7 @@ import numpy as np
 from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
-from ballpass.runtime.contract.units import TABLE_UNITS
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
@@ -80,7 +80,7 @@ class Sweep:
 
     def shown(self, quantity: str) -> tuple[np.ndarray, str]:
         """Values of a quantity on the grid, and their unit, as tables and figures show them."""
-        factor, unit = TABLE_UNITS.get(self.unit(quantity), (1.0, self.unit(quantity)))
+        factor, unit = table_unit(self.unit(quantity))
         return factor * self.result.observables[quantity].reshape(self.shape), unit
 
     def point(self, member: int) -> list[float]:

@@ -19,8 +19,8 @@ int ballpass_started(const ballpass *simulation);
 /* Ends the run: any parameter may be set again. */
 void ballpass_stop(ballpass *simulation);
 
-/* Add every step that a run takes to this row of reductions.h, until another one is given; NULL: to none.  Only with BALLPASS_REDUCTIONS.
-   A step that was read within is added when the run goes on behind it. */
+/* Add every step that a run takes to this row of reductions.h, until another one is given; NULL: to none.
+   Only with BALLPASS_REDUCTIONS.  A step that was read within is added when the run continues behind it. */
 void ballpass_reduce(ballpass *simulation, double *row);
 
 /* Begin of the segment at the time reached, and its middle [s]. */
