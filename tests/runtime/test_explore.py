@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from chromium import Page, needs_browser, opened
 from typer.testing import CliRunner
 
 from ballpass.derive import shipped_scenes
-from ballpass.runtime import Model
+from ballpass.runtime import Model, SimulationError, UnusualWarning
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.explore import scene_units
+from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot import explore
 from ballpass.runtime.plot.explore import explore_page
@@ -156,6 +158,17 @@ def test_a_link_carries_values_and_a_fault_stands_in_the_words_of_the_solver(
         ("punching_press_motor", ""),
         ("punching_press_hinges", "pin."),
         ("crank_shaper", ""),
+        *(
+            pytest.param(name, bearing, marks=pytest.mark.extreme)
+            for name, bearing in (
+                ("eccentric_pump", ""),
+                ("engine", ""),
+                ("offset_slider", ""),
+                ("punching_press_roller", ""),
+                ("rotor_two_bearings", "pulley."),
+                ("varying_compliance", ""),
+            )
+        ),
         pytest.param("four_bar", "", marks=pytest.mark.extreme),
         pytest.param("punching_press_tangent", "", marks=pytest.mark.extreme),
         pytest.param("punching_press_two_way", "", marks=pytest.mark.extreme),
@@ -262,3 +275,36 @@ def test_a_missing_compiler_names_the_extra(tmp_path: Path, monkeypatch: pytest.
     assert answer.exit_code == 2
     assert "ballpass[compiler]" in answer.stderr
     assert not list(tmp_path.iterdir())
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+def test_a_page_refuses_and_warns_in_the_words_of_native_runs(press: Model, page: Path, browser: Page) -> None:
+    browser.open(page)
+    shown(browser)
+    said = "[...document.querySelectorAll('#warned p')].map((one) => one.textContent)"
+    assert browser.value(said) == []
+    for numbers in (
+        {"mechanism.forces.punch.force.y": 89648.0},
+        {"bearing.clearance": 0.5e-3, "bearing.contact.outer_groove_radius": 4.6e-3},
+        {"mechanism.forces.punch.window.start": 0.0716, "mechanism.forces.punch.window.end": 0.0803},
+    ):
+        with pytest.warns(UnusualWarning):
+            native = summarize(press, press.simulate(parameters=numbers))["warnings"]
+        browser.value("own.forEach((value, k) => { values[k] = value; })")
+        for name, value in numbers.items():
+            browser.value(f"change(isNumber.get('{name}'), {value!r})")
+        browser.wait(f"{DONE} && {said}.length === {len(native)}")
+        assert browser.value(said) == [f"warning: {text}" for text in native]
+    for numbers in ({"mechanism.forces.punch.force.y": 4e6}, {"bearing.clearance": 20e-3}):
+        browser.value("own.forEach((value, k) => { values[k] = value; })")
+        for name, value in numbers.items():
+            browser.value(f"change(isNumber.get('{name}'), {value!r})")
+        with pytest.raises(SimulationError) as refused, warnings.catch_warnings(action="ignore"):
+            press.simulate(parameters=numbers)
+        status, why = str(refused.value).splitlines()
+        browser.wait(f"!get('fault').hidden && get('fault').textContent.includes({status!r})")
+        assert browser.value("get('fault').textContent").splitlines()[-1] in why
+        assert browser.value(said) == []
+    assert not browser.complaints

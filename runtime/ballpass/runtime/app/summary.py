@@ -29,13 +29,13 @@ from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.native.reduction_rows import why_void
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap, rated_element
+from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
+from ballpass.runtime.ratings.result_limits import VOID, limit_words, passed_limit
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -52,9 +52,6 @@ _TOOLS = ("casadi", "numpy", "scipy")
 
 #: The ball forces of a bearing whose peaks are reported, by their key.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
-
-#: Largest usual deflection of a ball over its diameter [1].
-MOST_DEFLECTION = 0.01
 
 #: Numbers that `add_turns` names; the file has all.
 SHOWN = 5
@@ -133,23 +130,19 @@ def _unusual(sol: Solution) -> list[str]:
     """
     said = []
     for bearing in sol.manifest.bearings:
-        noun = rated_element(bearing).noun
         ball = sol.parameters[f"{bearing.path}.ball_diameter"]
         known = {**sol.parameters, **sol.constants}
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
         apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
         displacement = float(np.max(apart))
         deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
-        void = why_void(bearing, known, deflection, displacement)
-        if void:
-            raise SimulationError(void)
-        if deflection > MOST_DEFLECTION * ball:
-            said.append(
-                f"{bearing.path}: a {noun} is deflected by {1e6 * deflection:.4g} um, "
-                f"{100.0 * deflection / ball:.3g} % of its diameter: unusual. "
-                f"Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
-                "beyond. Check loads, stiffness and their units."
-            )
+        limit = passed_limit(ball, deflection, displacement)
+        if limit is None:
+            continue
+        words = limit_words(bearing, limit, ball=ball, deflection=deflection, displaced=displacement)
+        if limit in VOID:
+            raise SimulationError(words)
+        said.append(words)
     return said
 
 

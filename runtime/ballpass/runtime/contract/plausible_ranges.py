@@ -57,23 +57,33 @@ def _outside(info: UsualInfo, columns: Mapping[str, Any]) -> Any:
     return odd & (scale > 0.0)  # a clearance of zero cannot be a scale
 
 
-def _sentence(manifest: Manifest, info: UsualInfo, columns: Mapping[str, Any], odd: np.ndarray) -> str:
-    """Sentence: the unusual numbers, the usual range, what to check; of many members the first."""
+def usual_template(manifest: Manifest, info: UsualInfo) -> tuple[str, str]:
+    """Sentence on unusual numbers as two templates of `str.format`: what was given, and what is usual.
+
+    They are filled with the values of `names` and, behind these, the first one over `of`, else their sum.
+    """
     units = {item.name: "" if item.unit == "1" else f" {item.unit}" for item in manifest.parameters}
-    k = int(np.argmax(odd))
-    values = [float(np.atleast_1d(columns[name])[k]) for name in info.names]
-    given = " and ".join(f"{name} = {value:.4g}{units[name]}" for name, value in zip(info.names, values, strict=True))
-    unit = "" if info.of else units[info.names[0]]
+    given = " and ".join(f"{name} = {{{k}:.4g}}{units[name]}" for k, name in enumerate(info.names))
+    unit, behind = "" if info.of else units[info.names[0]], len(info.names)
     if info.of:
-        given += f", {values[0] / abs(float(np.atleast_1d(columns[info.of])[k])):.3g} of {info.of}"
-    elif len(values) > 1 and not info.each:
-        given += f", together {sum(values):.4g}{unit}"
-    if len(odd) > 1:
-        given += f" (member {k}, the first of {np.count_nonzero(odd)} among {len(odd)})"
+        given += f", {{{behind}:.3g}} of {info.of}"
+    elif len(info.names) > 1 and not info.each:
+        given += f", together {{{behind}:.4g}}{unit}"
     if info.each:
         usual = f"an edge above {info.least:.3g}{unit}"
     elif info.least is None:
         usual = f"at most {info.most:.4g}{unit}"
     else:
         usual = " to ".join(dict.fromkeys((f"{info.least:.4g}", f"{info.most:.4g}"))) + unit
-    return f"{given}: unusual. Usual is {usual}. {info.hint}"
+    return given, f": unusual. Usual is {usual}. {info.hint}"
+
+
+def _sentence(manifest: Manifest, info: UsualInfo, columns: Mapping[str, Any], odd: np.ndarray) -> str:
+    """Sentence: the unusual numbers, the usual range, what to check; of many members the first."""
+    k = int(np.argmax(odd))
+    values = [float(np.atleast_1d(columns[name])[k]) for name in info.names]
+    together = values[0] / abs(float(np.atleast_1d(columns[info.of])[k])) if info.of else sum(values)
+    given, usual = (text.format(*values, together) for text in usual_template(manifest, info))
+    if len(odd) > 1:
+        given += f" (member {k}, the first of {np.count_nonzero(odd)} among {len(odd)})"
+    return given + usual

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.manifest import BearingInfo
-from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.ratings.result_limits import FLATTENED, VOID, limit_words, passed_limit
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ EXTREMES = {"max": 1, "min": -1}
 #: states, whose dense output is a polynomial, by Boole's rule for the balls.
 MOMENTS = {"integral": 1, "square": 2}
 
-#: The channel that shows whether a bearing can be so, and the largest share of a ball's diameter that it may be [1].
-DEFLECTION, FLATTENED = "ball.deflection", 0.1
+#: The channel that shows whether a bearing can be so.
+DEFLECTION = "ball.deflection"
 
 #: What a row holds of every channel.
 ROWS = (
@@ -166,31 +166,12 @@ def is_void(manifest: Manifest, values: Mapping[str, ArrayLike], rows: Array) ->
 def void_words(manifest: Manifest, values: Mapping[str, float], row: Array) -> str:
     """Why a run means nothing; empty where it is not void."""
     for bearing, (deflection,) in _deflections(manifest, row[None, :]):
-        words = why_void(bearing, values, deflection, deflection + values[f"{bearing.path}.clearance"] / 2.0)
-        if words:
-            return words
+        ball, clearance = (values[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
+        displaced = deflection + clearance / 2.0
+        limit = passed_limit(ball, deflection, displaced)
+        if limit in VOID:
+            return limit_words(bearing, limit, ball=ball, deflection=deflection, displaced=displaced)
     return ""
-
-
-def why_void(bearing: BearingInfo, values: Mapping[str, float], deflection: float, displaced: float) -> str:
-    """Why no bearing can be so; empty where one can.
-
-    Parameters
-    ----------
-    deflection, displaced : largest of a ball, and largest displacement of the rings [m]
-    """
-    ball, noun = values[f"{bearing.path}.ball_diameter"], rated_element(bearing).noun
-    if deflection <= FLATTENED * ball and displaced <= ball:
-        return ""
-    what = (
-        f"a {noun} is flattened by {1e3 * deflection:.4g} mm, {100.0 * deflection / ball:.3g} % of its diameter"
-        if deflection > FLATTENED * ball
-        else f"the rings are displaced by {1e3 * displaced:.4g} mm, more than a {noun}'s diameter"
-    )
-    return (
-        f"{bearing.path}: {what}: these results mean nothing, for no bearing can be so. Reduce load, speed or "
-        "clearance, give more damping, or check stiffness, masses and their units."
-    )
 
 
 def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo, Array]]:

@@ -232,7 +232,7 @@ async function work() {
     try {
       const began = performance.now(), run = await solve(values, () => wanted > 0);
       if (run === null) continue;
-      const results = resultsOf(run), solved = performance.now();
+      const warned = warningsOf(run), results = resultsOf(run), solved = performance.now();
       run.results = results;
       scene ??= run;
       current = run;
@@ -243,6 +243,8 @@ async function work() {
       frame = peaked ? drawn.peak : place;
       showRun(drawn);
       showResults(results, scene.results);
+      get("warned").replaceChildren();
+      warned.forEach((words) => element(get("warned"), "p", `warning: ${words}`));
       const [first, second] = [solved - began, performance.now() - solved];
       set(get("took"), { "data-solve": first, "data-draw": second });
       get("took").textContent = `Solved in ${first.toFixed(0)} ms, drawn in ${second.toFixed(0)} ms, all in this page.`;
@@ -251,6 +253,7 @@ async function work() {
     } catch (fault) {
       get("fault").textContent = `The solver says:\n${fault.message}`;
       get("fault").hidden = false; // the pictures are of the numbers before, and look like it
+      get("warned").replaceChildren();
     }
   }
   busy = false;

@@ -47,7 +47,7 @@ async function solve(values, stale) {
   while (time(first) < least) first += 1;
   const reduced = inMemory(machine.reduction, solver.reduction.size).fill(0); // the highest ball forces, of every step
   reduced[solver.reduction.from] = least * (1 - 1e-9);
-  for (const { top } of solver.bearings) reduced[top.wanted] = 1;
+  for (const { top, deflection } of solver.bearings) reduced[top.wanted] = reduced[deflection.wanted] = 1;
   machine.ballpass_reduce(machine.one, machine.reduction);
   const rows = new Float64Array((count - first + 1) * width), jumps = [];
   const apart = 1e-10 * whole; // closer than this a sample and a switch are one time
@@ -84,8 +84,8 @@ async function solve(values, stale) {
   machine.ballpass_ratings(machine.one, machine.ratings);
   machine.ballpass_reduce(machine.one, 0);
   const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), row = inMemory(machine.reduction, solver.reduction.size);
-  const tops = solver.bearings.map(({ top }) => ({ value: row[top.max], time: row[top.max_time] }));
-  return { values, known, ratings, tops, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
+  const tops = solver.bearings.map(({ top }) => ({ value: row[top.max], time: row[top.max_time] })), deflections = solver.bearings.map(({ deflection }) => row[deflection.max]);
+  return { values, known, ratings, tops, deflections, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
 }
 
 // Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.
@@ -209,6 +209,38 @@ function loadOf(run, load, row) {
 }
 
 const motionOf = (bearing, row) => bearing.inner.map((column, axis) => 1e6 * (row[column] - (bearing.outer ? row[bearing.outer[axis]] : 0)));
+
+// ------------------------------------------------------------------------------------------------------------- limits
+// A number as Python's format "g" writes it, and a template of `str.format` filled with such numbers.
+const general = (value, digits) => {
+  const [mantissa, power] = value.toExponential(digits - 1).split("e").map(Number);
+  return power < -4 || power >= digits ? `${mantissa}e${power < 0 ? "-" : "+"}${String(Math.abs(power)).padStart(2, "0")}` : String(Number(value.toPrecision(digits)));
+};
+const filled = (words, given) => words.replace(/\{(\w+):\.(\d)g\}/g, (_, name, digits) => general(given[name], Number(digits)));
+
+// What `ballpass run` warns of: numbers outside of their usual ranges, results that no real bearing shows. An error where these mean nothing.
+function warningsOf({ known, rows, count, deflections }) {
+  const said = solver.usual.flatMap(({ at, of, each, least, most, words }) => {
+    const values = at.map((place) => known[place]), total = values.reduce((sum, value) => sum + value), scale = of === null ? 1 : Math.abs(known[of]);
+    const odd = each ? values.every((value) => value > 0 && value < least) : (least !== null && total < least * scale) || (most !== null && total > most * scale);
+    return odd && scale > 0 ? [filled(words, [...values, of === null ? total : values[0] / scale])] : [];
+  });
+  solver.bearings.forEach((bearing, k) => {
+    const { limits, cosine, gap } = bearing, ball = known[bearing.ball], half = known[bearing.clearance] / 2;
+    const words = (limit, deflection, displaced) => filled(limits[limit], { deflection: 1e3 * deflection, displaced: 1e3 * displaced, share: 100 * deflection / ball });
+    const check = (deflection, displaced) => {
+      const limit = deflection > solver.limits.flattened * ball ? "flattened" : displaced > ball ? "displaced" : "";
+      if (limit) throw new Error(`${solver.limits.void}\n${words(limit, deflection, displaced)}`);
+    };
+    check(deflections[k], deflections[k] + half); // of every step
+    let displaced = 0; // of the samples, as the summary of a run has it
+    for (let n = 0; n < count; n += 1) displaced = Math.max(displaced, 1e-6 * length(motionOf(bearing, rows.subarray(n * width, (n + 1) * width))));
+    const deflection = (cosine === null ? 1 : known[cosine]) * (displaced - (gap === null ? half : known[gap]));
+    check(deflection, displaced);
+    if (deflection > solver.limits.deflected * ball) said.push(words("deflected", deflection, displaced));
+  });
+  return said;
+}
 
 // What the pictures show of a run, its last turn or cycle of turns, in the form in which the page brings the scene's own.
 function drawnOf(run) {

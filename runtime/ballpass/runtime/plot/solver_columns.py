@@ -12,12 +12,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from ballpass.runtime.contract import BearingInfo, Manifest, force_components, table_direction
+from ballpass.runtime.contract.manifest import UsualInfo
+from ballpass.runtime.contract.plausible_ranges import usual_template
+from ballpass.runtime.contract.status import Status
 from ballpass.runtime.export.scene_numbers import columns_of
 from ballpass.runtime.export.web_assembly import drawn_columns
-from ballpass.runtime.native.reduction_rows import HEAD, SECTORS, reduction_rows
+from ballpass.runtime.native.reduction_rows import DEFLECTION, HEAD, SECTORS, reduction_rows
 from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
 from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.ratings.result_limits import FLATTENED, MOST_DEFLECTION, limit_templates
 
 
 def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]:
@@ -50,6 +54,20 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
         "linkage": None if mechanism is None else _linkage(record, numbers["linkage"]["forces"], place, column),
         "bearings": [_bearing(record, info, place, column) for info in drawn],
         "reduction": {"size": reduction_rows(manifest).size, "from": HEAD.index("from")},
+        "usual": [_usual(manifest, info, place) for info in manifest.usual],
+        "limits": {"void": Status.VOID.value, "flattened": FLATTENED, "deflected": MOST_DEFLECTION},
+    }
+
+
+def _usual(manifest: Manifest, info: UsualInfo, place: Mapping[str, int]) -> dict[str, Any]:
+    """A range that numbers usually lie in, and the sentence where they do not."""
+    return {
+        "at": [place[name] for name in info.names],
+        "of": place[info.of] if info.of else None,
+        "each": info.each,
+        "least": info.least,
+        "most": info.most,
+        "words": "".join(usual_template(manifest, info)),
     }
 
 
@@ -137,6 +155,10 @@ def _bearing(
         "clearance": place[f"{bearing.path}.clearance"],
         "force": [column[f"{force}[{k + 1}]"] for k in range(bearing.balls)],
         "top": {kind: rows.column(kind, force) for kind in ("wanted", "max", "max_time")},
+        "deflection": {kind: rows.column(kind, own(DEFLECTION)) for kind in ("wanted", "max")},
+        "cosine": place.get(f"{bearing.path}.cos_contact_angle"),
+        "gap": place.get(f"{bearing.path}.radial_gap"),
+        "limits": limit_templates(bearing),
         "inner": pair(own("inner")),
         "outer": pair(own("outer")),
         "load": load,
