@@ -16,7 +16,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract import InputInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -53,6 +53,15 @@ class ForcingPeriod:
     def time(self, values: Mapping[str, float]) -> float:
         """The period for these numbers of the model [s]."""
         return float(self.count) * driver_angle.TURN / abs(values[self.rate])
+
+
+def refuse_free_driver(manifest: Manifest, question: str) -> None:
+    """Refuse a scene without states, and one whose driver's motion is a state: its period is not known."""
+    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
+        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
+        raise RequestError(
+            f"{question}: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed."
+        )
 
 
 def forcing_period(

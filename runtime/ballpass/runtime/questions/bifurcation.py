@@ -13,7 +13,6 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -163,11 +162,7 @@ def _figures(_model: AnyModel, found: Bifurcation, _parameters: object) -> Itera
     yield "bifurcation", draw_bifurcation(found.vary, found.state, found.unit, found.row, found.up, found.down)
 
 
-def _check(_values: Mapping[str, object]) -> None:
-    need("scipy")
-
-
-@Question(stage="simulate", figures=_figures, check=_check)
+@Question(stage="simulate", figures=_figures, needs="scipy")
 def bifurcation(
     model: AnyModel,
     vary: Vary,
@@ -207,13 +202,12 @@ def bifurcation(
     >>> [motion.exponent.high < 0.0 for motion in found.up]
     [True, True]
     """
+    from ballpass.runtime.ask.forcing_period import refuse_free_driver
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.run.locating import refuse_jumps
 
     manifest = model.manifest
-    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
-        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
-        raise RequestError(f"bifurcation: {why} in this scene. Allowed: bearings, and a driver at constant speed.")
+    refuse_free_driver(manifest, "bifurcation")
     if exponent:
         refuse_jumps(manifest, "bifurcation with an exponent")
     chosen = parameter_range(manifest, "vary", vary, counted=True)

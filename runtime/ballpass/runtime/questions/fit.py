@@ -12,7 +12,6 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity, table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -332,11 +331,7 @@ def _figures(_model: AnyModel, found: FitAnswer, _parameters: object) -> Iterato
         yield ("residuals" if k == 1 else f"residuals_{k}"), draw_residuals(*words, one.t, one.measured, one.model)
 
 
-def _check(_values: Mapping[str, object]) -> None:
-    need("scipy")
-
-
-@Question(stage="fit", figures=_figures, check=_check)
+@Question(stage="fit", figures=_figures, needs="scipy")
 def fit(
     model: AnyModel,
     data: Data,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.questions.sobol import Seed, Spread
@@ -127,11 +126,7 @@ def _figures(_model: AnyModel, found: MorrisAnswer, _parameters: object) -> Iter
         yield ("morris" if k == 0 else f"morris_{k + 1}"), draw_effects(one.name, one.unit, found.inputs, one.effects)
 
 
-def _check(_values: Mapping[str, object]) -> None:
-    need("scipy")
-
-
-@Question(stage="simulate", figures=_figures, check=_check)
+@Question(stage="simulate", figures=_figures, needs="scipy")
 def morris(
     model: AnyModel,
     vary: Spread,

@@ -15,7 +15,6 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import OPTIMUM_RTOL
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -279,15 +278,11 @@ def _figures(_model: AnyModel, found: Optimum, _parameters: object) -> Iterator[
     yield "trace", draw_trace(found.goal, found.unit, found.trace)
 
 
-def _check(_values: Mapping[str, object]) -> None:
-    need("scipy")
-
-
 def _best(found: Optimum) -> dict[str, float]:
     return dict(zip((one.name for one in found.vary), found.x.tolist(), strict=True))
 
 
-@Question(stage="search", figures=_figures, check=_check, steady=_best)
+@Question(stage="search", figures=_figures, needs="scipy", steady=_best)
 def optimize(
     model: AnyModel,
     minimize: Goal,

@@ -14,6 +14,7 @@ from inspect import Parameter, cleandoc, signature
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import options_of, refuse_faults
 from ballpass.runtime.report.report import Report
 
@@ -35,8 +36,8 @@ class Question:
     name : of the command; the function's if there is none
     report : of an answer
     stage : words of its progress
-    check : of values of the options: RequestError where they contradict each other; the command does it before anything
-        is derived
+    needs : optional package without which there is no answer
+    check : of values of the options: RequestError where they contradict each other
     runs : whether it integrates, so that the stepper is compiled first
     samples : whether samples are enough, which other methods give without a compiler
     takes_runs : whether the solution of a run may stand in place of the model
@@ -50,6 +51,7 @@ class Question:
     name: str = ""
     report: Callable[[Any], Report] = lambda answer: answer.report()
     stage: str = "simulate"
+    needs: str = ""
     check: Callable[[Mapping[str, Any]], None] | None = None
     runs: bool = True
     samples: bool = False
@@ -57,6 +59,13 @@ class Question:
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
     always: bool = False
     steady: bool | Callable[[Any], Mapping[str, float]] = False
+
+    def refuse(self, values: Mapping[str, Any]) -> None:
+        """Refuse a missing package, and values that contradict each other; the command does it before it derives."""
+        if self.needs:
+            need(self.needs)
+        if self.check is not None:
+            self.check(values)
 
     def __call__(self, ask: _Function) -> _Function:
         call = typed(ask)
@@ -66,8 +75,7 @@ class Question:
             values = signature(ask).bind(*given, **named)
             values.apply_defaults()
             refuse_faults(options_of(ask), values.arguments)
-            if self.check is not None:
-                self.check(values.arguments)
+            self.refuse(values.arguments)
             return call(*given, **named)
 
         checked.__doc__ = _with_options(ask)

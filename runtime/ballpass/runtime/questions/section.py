@@ -202,14 +202,13 @@ def section(
     >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
     True
     """
+    from ballpass.runtime.ask.forcing_period import refuse_free_driver
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
     from ballpass.runtime.run.ball_angles import ball_angles
 
     manifest = model.manifest
-    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
-        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
-        raise RequestError(f"section: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
+    refuse_free_driver(manifest, "section")
     turn = model.period(parameters or {})
     if not math.isfinite(turn):
         raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.questions.optimize import Limits, read_limit
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -218,7 +217,6 @@ def _figures(_model: AnyModel, found: SobolAnswer, _parameters: object) -> Itera
 
 
 def _check(values: Mapping[str, Any]) -> None:
-    need("scipy")
     samples = values["samples"]
     if samples & (samples - 1):
         near = 2 ** round(math.log2(samples))
@@ -227,7 +225,7 @@ def _check(values: Mapping[str, Any]) -> None:
         raise RequestError('of: no quantity was named. Give one (--of), or a limit of one (--limit "Q <= VALUE").')
 
 
-@Question(stage="simulate", figures=_figures, check=_check)
+@Question(stage="simulate", figures=_figures, needs="scipy", check=_check)
 def sobol(
     model: AnyModel,
     vary: Spread,

@@ -11,7 +11,6 @@ import numpy as np
 
 from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -221,7 +220,6 @@ class SignalSpectrum(ShortRepr, Reported):
 
 
 def _check(values: Mapping[str, Any]) -> None:
-    need("scipy")
     if values["kurtogram"] and values["envelope"] is not None:
         raise RequestError("--kurtogram chooses the band, and --envelope was given as well. Omit one of the two.")
     if values["orders"] and values["scaling"] != "amplitude":
@@ -269,7 +267,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     yield "spectrum", figure
 
 
-@Question(stage="spectrum", samples=True, check=_check, figures=_figures, always=True, takes_runs=True)
+@Question(stage="spectrum", samples=True, needs="scipy", check=_check, figures=_figures, always=True, takes_runs=True)
 def spectrum(
     model: AnyModel,
     of: Of,

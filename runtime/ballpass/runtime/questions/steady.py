@@ -275,15 +275,13 @@ def steady(
     ('inner.x', (8,))
     """
     from ballpass.runtime.ask.contact_sequence import contact_sequence
-    from ballpass.runtime.ask.forcing_period import forcing_period
+    from ballpass.runtime.ask.forcing_period import forcing_period, refuse_free_driver
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
 
     manifest = model.manifest
-    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
-        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
-        raise RequestError(f"steady: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed.")
+    refuse_free_driver(manifest, "steady")
     _ = model.stepper  # refused here where a scene has none
     ends = None if over is None else parameter_range(manifest, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}

@@ -200,8 +200,7 @@ def _ask(
 ) -> None:
     """Run the question, write and print."""
     with command(scene) as stages:
-        if question.check is not None:
-            question.check(values)
+        question.refuse(values)
         folder, formats = _place(question, scene, out, format_, figures=figures)
         stages("read")
         model, overrides = _source(question, scene, set_, values, stages)
