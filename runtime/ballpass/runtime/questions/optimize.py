@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -13,10 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ballpass.runtime.contract.defaults import OPTIMUM_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
-from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -26,19 +22,14 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ballpass.runtime.ask.limits import Limit
     from ballpass.runtime.ask.parameter_range import ParameterRange
 
 #: Candidates of which each start is the best; they run in lanes.
 CANDIDATES = 8
 
-#: Distance from a kink at which its slopes are verified, in shares of the range [1].
-BESIDE = 5e-3
-
-#: Slopes of the search and of the check agree within this share [1].
-AGREES = 1e-3
-
-#: Most tolerances; points within their box, beside its corners, of which the worst is taken; further ones that check.
-MOST_TOLERANCES, WITHIN, FURTHER = 6, 15, 256
+#: Most tolerances: the corners of their box are all taken.
+MOST_TOLERANCES = 6
 
 #: A further point that is worse by more is warned of, as a share of the goal [1].
 WORSE = 1e-3
@@ -69,29 +60,6 @@ Tolerance = Annotated[
     ),
 ]
 Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limit:
-    """A constraint on a quantity.
-
-    Attributes
-    ----------
-    quantity, unit : its name and unit
-    upper : whether the quantity must stay below
-    limit : [unit]
-    value : at the optimum [unit]
-    active : whether it holds the optimum
-    multiplier : change of the goal by that of the limit [goal's unit / unit]
-    """
-
-    quantity: str
-    unit: str
-    upper: bool
-    limit: float
-    value: float = float("nan")
-    active: bool = False
-    multiplier: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -189,6 +157,8 @@ class Optimum(ShortRepr, Reported):
             for limit in self.limits
         ]
         if self.tolerances:
+            from ballpass.runtime.certify.worst_values import FURTHER
+
             deviations = ", ".join(
                 f"{one.name} {value / one.factor:+.6g} {one.shown_unit}"
                 for one, value in zip(self.tolerances, self.worst, strict=True)
@@ -207,7 +177,7 @@ class Optimum(ShortRepr, Reported):
         ends = ", ".join(f"{end:.7g}" for _, end in self.starts)
         said.append(f"{len(self.starts)} start{'s' if len(self.starts) > 1 else ''} ended at {ends} {self.unit}")
         wrong = [name for name, verdict in self.verdicts if verdict == "disagrees"]
-        broken = [one.quantity for one in self.limits if _over(one) > ACTIVE]
+        broken = [one.quantity for one in self.limits if one.beyond > ACTIVE]
         fault = ""
         if wrong:
             fault = f"Slopes by {', '.join(wrong)} disagree with the second route: this need not be the least value."
@@ -242,34 +212,6 @@ class Optimum(ShortRepr, Reported):
         return Report(
             parts=(table, *said), facts=facts, records=rows, index=("parameter",), warnings=warned, fault=fault
         )
-
-
-def _over(limit: Limit) -> float:
-    """How far a quantity is beyond its limit, as a share of it [1]."""
-    beyond = (limit.value - limit.limit) * (1.0 if limit.upper else -1.0)
-    return beyond / max(abs(limit.limit), 1e-300)
-
-
-def read_limit(model: AnyModel, text: str) -> Limit:
-    """A constraint from text such as ``rms:inner.y <= 5 um``.
-
-    Raises
-    ------
-    RequestError
-        Another form, an unknown quantity, or a wrong unit.
-    """
-    from ballpass.runtime.quantity.grammar import quantities_of
-
-    match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text)
-    if match is None:
-        raise RequestError(f'subject_to: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
-    name, sign, written = match.groups()
-    unit = quantities_of(model, [name])[0].unit
-    try:
-        value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
-    except (QuantityError, ValueError) as error:
-        raise RequestError(f"subject_to {name}: {error}") from None
-    return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)
 
 
 def _figures(_model: AnyModel, found: Optimum, _parameters: object) -> Iterator[tuple[str, Figure]]:
@@ -324,10 +266,11 @@ def optimize(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.bundle import Plane, minimize_by_planes
+    from ballpass.runtime.ask.bundle import minimize_by_planes
     from ballpass.runtime.ask.kept_parts import kept_parts
+    from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.parameter_range import parameter_range
-    from ballpass.runtime.certify.quantity_function import QuantityFunction
+    from ballpass.runtime.certify.worst_values import WorstValues
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
 
@@ -337,117 +280,53 @@ def optimize(
         raise RequestError(
             f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."
         )
-    limits = [read_limit(model, text) for text in _texts(subject_to)]
-    names = list(dict.fromkeys([minimize, *(one.quantity for one in limits)]))
-    count = len(ranges)
-    every = list(dict.fromkeys(one.name for one in (*ranges, *box)))
-    lanes, exact = (
-        QuantityFunction(
-            model, names, every, cycles, transient=transient, parameters=parameters, rtol=OPTIMUM_RTOL, kinks=kinks
-        )
-        for kinks in (None, "located")
-    )
-    deviations = _deviations(every, box)
-    columns = [0, *(names.index(one.quantity) for one in limits)]
-    signs = np.array([1.0, *(1.0 if one.upper else -1.0 for one in limits)])
-    offsets = np.array([0.0, *(one.limit for one in limits)])
-    shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
-
-    def rows_at(share: np.ndarray) -> np.ndarray:
-        """Values of all parameters with each deviation, the first with none."""
-        x = exact.start.copy()
-        x[:count] = [one.at(float(s)) for one, s in zip(ranges, share, strict=True)]
-        found: np.ndarray = x + deviations
-        return found
-
+    limits = read_limits(model, _texts(subject_to))
+    worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
+    shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
     with (
-        kept_parts(keep, model, names, every, cycles, transient, parameters, OPTIMUM_RTOL, deviations) as parts,
+        kept_parts(keep, model, *worst.decides) as parts,
         shown("searching", progress) as tell,
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
-        (first,) = parts.once(shares, lambda: (lanes(np.array([rows_at(share) for share in shares])),))
-        scaled = signs * (first[..., columns] - offsets)
-        sizes = np.array([float(np.median(np.abs(first[..., 0]))), *(abs(one.limit) for one in limits)])
-        sizes = np.maximum(sizes, 1e-300)
-
-        def worst_at(share: np.ndarray) -> np.ndarray:
-            """The deviation with the worst value of goal and each limit."""
-            if len(deviations) == 1:
-                return np.zeros(len(columns), dtype=int)
-            found: np.ndarray = np.argmax(signs * lanes(rows_at(share))[:, columns], axis=0)
-            return found
-
-        def exactly(share: np.ndarray) -> tuple[np.ndarray, ...]:
-            which = worst_at(share)
-            rows, place = np.unique(which, return_inverse=True)
-            x = rows_at(share)[rows]
-            return exact(x)[place, columns], exact.jacobian(x)[place, columns, :count], which
-
-        def evaluate(share: np.ndarray) -> Plane:
-            values, slopes, _ = parts.once(share, lambda: exactly(share))
-            by_share = np.array([one.slope(float(s)) for one, s in zip(ranges, share, strict=True)])
-            size = (signs / sizes)[:, None]
-            return Plane(x=share, values=signs * (values - offsets) / sizes, slopes=size * slopes * by_share)
-
-        merits = [
-            Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, (scaled / sizes).max(axis=1), strict=True)
-        ]
+        merits = worst.candidates(shares, parts)
         found = []
         for block in range(starts):
             at = CANDIDATES * block + int(np.argmin(merits[CANDIDATES * block : CANDIDATES * (block + 1)]))
-            found.append((shares[at], minimize_by_planes(evaluate, shares[at])))
+            found.append((shares[at], minimize_by_planes(lambda share: worst.plane(share, parts), shares[at])))
             if tell is not None:
                 tell((block + 1) / (starts + 1))
-        _, least = min(found, key=lambda pair: pair[1].best.merit)
-        best = least.best
-        sides = least.sides if len(least.sides) > 1 else (best,)
-        verdicts: dict[str, str] = {}
-        for side in sides:
-            away = side.x - best.x
-            there = best.x if len(sides) == 1 else best.x + BESIDE * away / max(float(np.max(np.abs(away))), 1e-300)
-            there = np.clip(there, 0.0, 1.0)
-            row = rows_at(there)[worst_at(there)[0]]
-            taken = exact.jacobian(row)[0]
-            for pair in exact.certify(row, progress=False).pairs:
-                if pair.quantity != minimize or pair.parameter not in every[:count]:
-                    continue
-                slope = float(taken[every.index(pair.parameter)])
-                agrees = abs(slope - pair.by_steps) <= AGREES * abs(slope)
-                if verdicts.get(pair.parameter) != "disagrees":
-                    verdicts[pair.parameter] = pair.check.verdict.value if agrees else "disagrees"
-        rows = rows_at(best.x)
-        worst = deviations[worst_at(best.x)[0]]
+        least = min((one for _, one in found), key=lambda one: one.best.merit)
+        best, sizes = least.best, worst.sizes
+        verdicts = worst.verdicts(least)
+        deviations = worst.worst_deviations(best.x)
         nominal, further = float(best.values[0] * sizes[0]), math.nan
         if box:
-            spread = Halton(len(box), scramble=False).random(FURTHER + WITHIN + 1)[WITHIN + 1 :]
-            nominal = float(exact(rows[0])[0])
-            further = float(np.max(lanes(rows[0] + _placed(every, box, spread))[:, 0]))
-    size = sizes[0]
-    by_share = np.array([one.slope(float(s)) for one, s in zip(ranges, best.x, strict=True)])
+            nominal, further = worst.without_deviations(best.x), worst.worst_of_further(best.x)
+    slopes = [side.slopes[0] * sizes[0] / worst.by_share(best.x) for side in least.sides]
     return Optimum(
         goal=minimize,
         unit=quantities_of(model, [minimize])[0].unit,
-        value=float(best.values[0] * size),
+        value=float(best.values[0] * sizes[0]),
         vary=ranges,
-        x=rows[0, :count],
+        x=worst.at(best.x),
         bounds=tuple("first" if s < ACTIVE else "second" if s > 1.0 - ACTIVE else "" for s in best.x.tolist()),
-        slopes=np.array([side.slopes[0] * size / by_share for side in sides]),
+        slopes=np.array(slopes),
         limits=tuple(
             replace(
                 one,
-                value=float(one.limit + signs[k] * best.values[k] * sizes[k]),
+                value=float(one.limit + one.sign * best.values[k] * sizes[k]),
                 active=bool(abs(best.values[k]) < ACTIVE),
-                multiplier=-float(signs[k] * least.multipliers[k - 1] * size / sizes[k]),
+                multiplier=-float(one.sign * least.multipliers[k - 1] * sizes[0] / sizes[k]),
             )
             for k, one in enumerate(limits, start=1)
         ),
         verdicts=tuple(verdicts.items()),
-        starts=tuple((tuple(rows_at(s)[0, :count].tolist()), float(one.best.values[0] * size)) for s, one in found),
-        trace=tuple(float(one.values[0] * size) for one in least.trace),
+        starts=tuple((tuple(worst.at(s).tolist()), float(one.best.values[0] * sizes[0])) for s, one in found),
+        trace=tuple(float(one.values[0] * sizes[0]) for one in least.trace),
         converged=least.converged,
         tolerances=box,
-        worst=tuple(float(worst[every.index(one.name)]) for one in box),
+        worst=deviations,
         nominal=nominal,
         further=further,
     )
@@ -455,22 +334,3 @@ def optimize(
 
 def _texts(given: str | Sequence[str] | None) -> list[str]:
     return [given] if isinstance(given, str) else list(given or [])
-
-
-def _deviations(names: Sequence[str], box: Sequence[ParameterRange]) -> np.ndarray:
-    """Deviations of all parameters: none, the corners of the box, and points within, shape (points, parameters)."""
-    from scipy.stats.qmc import Halton
-
-    if not box:
-        return np.zeros((1, len(names)))
-    corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(box))))
-    within = Halton(len(box), scramble=False).random(WITHIN + 1)[1:]
-    return np.concatenate([np.zeros((1, len(names))), _placed(names, box, np.concatenate([corners, within]))])
-
-
-def _placed(names: Sequence[str], box: Sequence[ParameterRange], shares: np.ndarray) -> np.ndarray:
-    """Deviations of all parameters from shares of the box."""
-    found = np.zeros((len(shares), len(names)))
-    for one, column in zip(box, shares.T, strict=True):
-        found[:, names.index(one.name)] = one.low + column * (one.high - one.low)
-    return found

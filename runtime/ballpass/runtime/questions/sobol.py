@@ -12,7 +12,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
-from ballpass.runtime.questions.optimize import Limits, read_limit
+from ballpass.runtime.questions.optimize import Limits
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -268,11 +268,12 @@ def sobol(
     from scipy.stats.qmc import Sobol
 
     from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_members, values_of, words_of
+    from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.variance_shares import variance_shares, wilson
     from ballpass.runtime.quantity.grammar import quantities_of
 
     inputs = read_inputs(model, vary)
-    limits = [read_limit(model, text) for text in ([limit] if isinstance(limit, str) else list(limit or []))]
+    limits = read_limits(model, [limit] if isinstance(limit, str) else list(limit or []))
     names = [of] if isinstance(of, str) else list(of or [])
     names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
     units = [one.unit for one in quantities_of(model, names)]

@@ -1,0 +1,69 @@
+"""A limit of a quantity as questions take it: ``rms:inner.y <= 5 um``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.point.point_model import PointModel
+from ballpass.runtime.quantity.grammar import quantities_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """A constraint on a quantity.
+
+    Attributes
+    ----------
+    quantity, unit : its name and unit
+    upper : whether the quantity must stay below
+    limit : [unit]
+    value : at the optimum [unit]
+    active : whether it holds the optimum
+    multiplier : change of the goal by that of the limit [goal's unit / unit]
+    """
+
+    quantity: str
+    unit: str
+    upper: bool
+    limit: float
+    value: float = float("nan")
+    active: bool = False
+    multiplier: float = 0.0
+
+    @property
+    def sign(self) -> float:
+        """1 for an upper limit, -1 for a lower one."""
+        return 1.0 if self.upper else -1.0
+
+    @property
+    def beyond(self) -> float:
+        """How far the quantity is beyond the limit, as a share of it [1]."""
+        return self.sign * (self.value - self.limit) / max(abs(self.limit), 1e-300)
+
+
+def read_limits(model: PointModel, texts: Sequence[str]) -> list[Limit]:
+    """Constraints from texts.
+
+    Raises
+    ------
+    RequestError
+        Another form, an unknown quantity, or a wrong unit.
+    """
+    return [_read(model, text) for text in texts]
+
+
+def _read(model: PointModel, text: str) -> Limit:
+    match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text)
+    if match is None:
+        raise RequestError(f'subject_to: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
+    name, sign, written = match.groups()
+    unit = quantities_of(model, [name])[0].unit
+    try:
+        value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
+    except (QuantityError, ValueError) as error:
+        raise RequestError(f"subject_to {name}: {error}") from None
+    return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)

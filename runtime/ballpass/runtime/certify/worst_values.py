@@ -1,0 +1,178 @@
+"""A goal and limits over ranges of parameters, each the worst of all deviations within tolerances.
+
+In: a model, quantities, ranges, tolerances.  Out: values in lanes, tangent planes for `bundle`, a check of the slopes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats.qmc import Halton
+
+from ballpass.runtime.ask.bundle import BundleMinimum, Plane
+from ballpass.runtime.ask.kept_parts import KeptParts
+from ballpass.runtime.ask.limits import Limit
+from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.certify.quantity_function import QuantityFunction
+from ballpass.runtime.contract.defaults import OPTIMUM_RTOL
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: Points within the tolerances, beside their corners, of which the worst is taken; further ones that check it.
+WITHIN, FURTHER = 15, 256
+
+#: Distance from a kink at which its slopes are verified, in shares of the range [1].
+BESIDE = 5e-3
+
+#: Slopes of the search and of the check agree within this share [1].
+AGREES = 1e-3
+
+
+class WorstValues:
+    """Goal and limits as functions of shares of the ranges, 0 to 1.
+
+    In planes they are scaled to the order of one, and limits are kept where they are not above 0.
+
+    Parameters
+    ----------
+    goal : quantity to make least
+    limits : of other quantities
+    vary, box : ranges of what is varied, and of the deviations
+
+    Attributes
+    ----------
+    deviations : of all parameters: none, the corners of the box, and points within, shape (points, parameters)
+    sizes : of goal and limits, SI; known after `candidates`
+    """
+
+    def __init__(
+        self,
+        model: LoadedModel,
+        goal: str,
+        limits: Sequence[Limit],
+        vary: Sequence[ParameterRange],
+        box: Sequence[ParameterRange],
+        *,
+        cycles: float | None,
+        transient: float | None,
+        parameters: Mapping[str, float] | None,
+    ) -> None:
+        self._goal, self._limits, self._vary, self._box = goal, limits, vary, box
+        names = list(dict.fromkeys([goal, *(one.quantity for one in limits)]))
+        self._names = list(dict.fromkeys(one.name for one in (*vary, *box)))
+        self._lanes, self._exact = (
+            QuantityFunction(
+                model,
+                names,
+                self._names,
+                cycles,
+                transient=transient,
+                parameters=parameters,
+                rtol=OPTIMUM_RTOL,
+                kinks=kinks,
+            )
+            for kinks in (None, "located")
+        )
+        self._columns = [0, *(names.index(one.quantity) for one in limits)]
+        self._signs = np.array([1.0, *(one.sign for one in limits)])
+        self._offsets = np.array([0.0, *(one.limit for one in limits)])
+        self.deviations = self._all_deviations()
+        self.decides = (names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self.deviations)
+        self.sizes = np.ones(len(self._columns))
+
+    def candidates(self, shares: np.ndarray, parts: KeptParts) -> np.ndarray:
+        """Merits of points, which also give the sizes, shape (points,)."""
+        (found,) = parts.once(shares, lambda: (self._lanes(np.array([self._rows(share) for share in shares])),))
+        scaled = self._signs * (found[..., self._columns] - self._offsets)
+        sizes = [float(np.median(np.abs(found[..., 0]))), *(abs(one.limit) for one in self._limits)]
+        self.sizes = np.maximum(sizes, 1e-300)
+        worst = (scaled / self.sizes).max(axis=1)
+        return np.array([Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, worst, strict=True)])
+
+    def plane(self, share: np.ndarray, parts: KeptParts) -> Plane:
+        """Values and exact slopes at a point."""
+        values, slopes, _ = parts.once(share, lambda: self._exactly(share))
+        size = (self._signs / self.sizes)[:, None]
+        return Plane(
+            x=share,
+            values=self._signs * (values - self._offsets) / self.sizes,
+            slopes=size * slopes * self.by_share(share),
+        )
+
+    def by_share(self, share: np.ndarray) -> np.ndarray:
+        """Derivatives of the varied parameters by their shares."""
+        return np.array([one.slope(float(s)) for one, s in zip(self._vary, share, strict=True)])
+
+    def at(self, share: np.ndarray) -> np.ndarray:
+        """Values of the varied parameters, SI."""
+        return np.array([one.at(float(s)) for one, s in zip(self._vary, share, strict=True)])
+
+    def worst_deviations(self, share: np.ndarray) -> tuple[float, ...]:
+        """Deviations at which the goal is worst, SI, one for each tolerance."""
+        worst = self.deviations[self._worst(share)[0]]
+        return tuple(float(worst[self._names.index(one.name)]) for one in self._box)
+
+    def without_deviations(self, share: np.ndarray) -> float:
+        """The goal at no deviation [its unit]."""
+        return float(self._exact(self._rows(share)[0])[0])
+
+    def worst_of_further(self, share: np.ndarray) -> float:
+        """The worst goal at points of the box that the search does not see [its unit]."""
+        spread = Halton(len(self._box), scramble=False).random(FURTHER + WITHIN + 1)[WITHIN + 1 :]
+        return float(np.max(self._lanes(self._rows(share)[0] + self._placed(spread))[:, 0]))
+
+    def verdicts(self, least: BundleMinimum) -> dict[str, str]:
+        """Check of the goal's slopes by a second route, by parameter; beside a kink on each of its sides."""
+        found: dict[str, str] = {}
+        for side in least.sides:
+            there = least.best.x
+            if len(least.sides) > 1:
+                away = side.x - there
+                there = np.clip(there + BESIDE * away / max(float(np.max(np.abs(away))), 1e-300), 0.0, 1.0)
+            row = self._rows(there)[self._worst(there)[0]]
+            taken = self._exact.jacobian(row)[0]
+            for pair in self._exact.certify(row, progress=False).pairs:
+                if pair.quantity != self._goal or pair.parameter not in self._names[: len(self._vary)]:
+                    continue
+                slope = float(taken[self._names.index(pair.parameter)])
+                agrees = abs(slope - pair.by_steps) <= AGREES * abs(slope)
+                if found.get(pair.parameter) != "disagrees":
+                    found[pair.parameter] = pair.check.verdict.value if agrees else "disagrees"
+        return found
+
+    def _rows(self, share: np.ndarray) -> np.ndarray:
+        """Values of all parameters with each deviation, the first with none."""
+        x = self._exact.start.copy()
+        x[: len(self._vary)] = self.at(share)
+        found: np.ndarray = x + self.deviations
+        return found
+
+    def _worst(self, share: np.ndarray) -> np.ndarray:
+        """The deviation with the worst value of goal and each limit."""
+        if len(self.deviations) == 1:
+            return np.zeros(len(self._columns), dtype=int)
+        found: np.ndarray = np.argmax(self._signs * self._lanes(self._rows(share))[:, self._columns], axis=0)
+        return found
+
+    def _exactly(self, share: np.ndarray) -> tuple[np.ndarray, ...]:
+        which = self._worst(share)
+        rows, place = np.unique(which, return_inverse=True)
+        x = self._rows(share)[rows]
+        slopes = self._exact.jacobian(x)[place, self._columns, : len(self._vary)]
+        return self._exact(x)[place, self._columns], slopes, which
+
+    def _all_deviations(self) -> np.ndarray:
+        none = np.zeros((1, len(self._names)))
+        if not self._box:
+            return none
+        corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(self._box))))
+        within = Halton(len(self._box), scramble=False).random(WITHIN + 1)[1:]
+        return np.concatenate([none, self._placed(np.concatenate([corners, within]))])
+
+    def _placed(self, shares: np.ndarray) -> np.ndarray:
+        """Deviations of all parameters from shares of the box."""
+        found = np.zeros((len(shares), len(self._names)))
+        for one, column in zip(self._box, shares.T, strict=True):
+            found[:, self._names.index(one.name)] = one.low + column * (one.high - one.low)
+        return found
