@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import INK, SIGNAL, caption, label, new_figure, styled
 
 
@@ -18,11 +19,13 @@ def draw_trace(goal: str, unit: str, trace: Sequence[float]) -> Figure:
     """Values in the order of the evaluations, and the least so far."""
     figure = new_figure(4.0)
     axes = figure.add_subplot()
+    factor, shown = table_unit(unit)
+    trace = [factor * value for value in trace]
     number = np.arange(1, len(trace) + 1)
     axes.plot(number, trace, "o", color=SIGNAL, markersize=4, label="each evaluation")
     axes.step(number, np.minimum.accumulate(trace), where="post", color=INK, linewidth=1.4, label="least so far")
     axes.set_xlabel(label("evaluation", "1"))
-    axes.set_ylabel(label(goal, unit))
+    axes.set_ylabel(label(goal, shown))
     axes.legend()
     caption(figure, f"Search for the least {goal}", "Each evaluation is a run with derivatives.")
     return figure

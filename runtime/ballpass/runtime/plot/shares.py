@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.variance_shares import VarianceShare
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, INK, SIGNAL, caption, label, new_figure, styled
 
 
@@ -34,9 +35,10 @@ def draw_shares(
         below[0].set_yticks(place, [inputs[k] for k in order])
         below[0].set_xlabel("share in the variance")
         below[0].legend(loc="lower right")
-    known = values[np.isfinite(values)]
+    factor, shown = table_unit(unit)
+    known = factor * values[np.isfinite(values)]
     below[-1].hist(known, bins=min(60, max(8, round(np.sqrt(len(known))))), color=INK)
-    below[-1].set_xlabel(label(name, unit))
+    below[-1].set_xlabel(label(name, shown))
     below[-1].set_ylabel("members")
     caption(figure, f"What makes {name} vary", "Lines are 95 % intervals by bootstrap.")
     return figure

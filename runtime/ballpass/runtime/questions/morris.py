@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.questions.sobol import Seed, Spread
 from ballpass.runtime.report.report import Report, ReportTable
@@ -83,17 +84,18 @@ class MorrisAnswer(ShortRepr, Reported):
         for one in self.quantities:
             ranked = sorted(zip(self.inputs, one.effects, strict=True), key=lambda pair: -pair[1].size)
             right = ("size", "mean", "deviation")
+            factor, unit = table_unit(one.unit)
             parts.append(
                 ReportTable(
-                    title=f"Effects on {one.name} [{one.unit}]",
+                    title=f"Effects on {one.name} [{unit}]",
                     heads=("input", "size", "95 % interval", "mean", "deviation"),
                     rows=[
                         (
                             name,
-                            f"{effect.size:.4g}",
-                            f"{effect.size_low:.4g} to {effect.size_high:.4g}",
-                            f"{effect.mean:.4g}",
-                            f"{effect.deviation:.4g}",
+                            f"{factor * effect.size:.4g}",
+                            f"{factor * effect.size_low:.4g} to {factor * effect.size_high:.4g}",
+                            f"{factor * effect.mean:.4g}",
+                            f"{factor * effect.deviation:.4g}",
                         )
                         for name, effect in ranked
                     ],

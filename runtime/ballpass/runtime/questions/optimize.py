@@ -13,6 +13,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -132,30 +133,30 @@ class Optimum(ShortRepr, Reported):
             }
             for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
         ]
+        factor, unit = table_unit(self.unit)
         table = ReportTable(
-            title=f"Least {'worst ' if self.tolerances else ''}{self.goal}: {self.value:.9g} {self.unit}",
-            heads=("parameter", "value", "unit", "held by", f"slope [{self.unit} per SI unit]"),
+            title=f"Least {'worst ' if self.tolerances else ''}{self.goal}: {factor * self.value:.9g} {unit}",
+            heads=("parameter", "value", "unit", "held by", f"slope [{unit} per that unit]"),
             rows=[
                 (
                     one.name,
                     f"{value / one.factor:.8g}",
                     one.shown_unit,
                     f"{bound} end" if bound else "",
-                    ", ".join(f"{slope:.5g}" for slope in self.slopes[:, k]),
+                    ", ".join(f"{factor * one.factor * slope:.5g}" for slope in self.slopes[:, k]),
                 )
                 for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
             ],
             right=("value",),
         )
-        said = [
-            f"{limit.quantity} is {limit.value:.6g} {limit.unit}, limit {limit.limit:.6g}: "
-            + (
-                f"active, multiplier {limit.multiplier:.4g} {self.unit}/({limit.unit})"
-                if limit.active
-                else "not active"
+        said = []
+        for limit in self.limits:
+            its, its_unit = table_unit(limit.unit)
+            multiplier = f"active, multiplier {limit.multiplier * factor / its:.4g} {unit}/({its_unit})"
+            said.append(
+                f"{limit.quantity} is {its * limit.value:.6g} {its_unit}, limit {its * limit.limit:.6g}: "
+                + (multiplier if limit.active else "not active")
             )
-            for limit in self.limits
-        ]
         if self.tolerances:
             from ballpass.runtime.certify.worst_values import FURTHER
 
@@ -164,8 +165,8 @@ class Optimum(ShortRepr, Reported):
                 for one, value in zip(self.tolerances, self.worst, strict=True)
             )
             said.append(
-                f"Worst at {deviations}. Without deviations {self.goal} is {self.nominal:.7g} {self.unit}; at "
-                f"{FURTHER} more points of the tolerances it is at most {self.further:.7g} {self.unit}."
+                f"Worst at {deviations}. Without deviations {self.goal} is {factor * self.nominal:.7g} {unit}; at "
+                f"{FURTHER} more points of the tolerances it is at most {factor * self.further:.7g} {unit}."
             )
         if self.kinked:
             said.append(
@@ -174,8 +175,8 @@ class Optimum(ShortRepr, Reported):
             )
         checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts)
         said.append(f"slopes {'beside the kink ' if self.kinked else ''}by a second route: {checked}")
-        ends = ", ".join(f"{end:.7g}" for _, end in self.starts)
-        said.append(f"{len(self.starts)} start{'s' if len(self.starts) > 1 else ''} ended at {ends} {self.unit}")
+        ends = ", ".join(f"{factor * end:.7g}" for _, end in self.starts)
+        said.append(f"{len(self.starts)} start{'s' if len(self.starts) > 1 else ''} ended at {ends} {unit}")
         wrong = [name for name, verdict in self.verdicts if verdict == "disagrees"]
         broken = [one.quantity for one in self.limits if one.beyond > ACTIVE]
         fault = ""
@@ -188,8 +189,8 @@ class Optimum(ShortRepr, Reported):
         warned = []
         if self.further > self.value + WORSE * abs(self.value):
             warned.append(
-                f"{self.goal} is {self.further:.6g} {self.unit} at a point within the tolerances at which the search "
-                "did not evaluate it: the worst is larger than the value given. Give narrower tolerances."
+                f"{self.goal} is {factor * self.further:.6g} {unit} at a point within the tolerances at which the "
+                "search did not evaluate it: the worst is larger than the value given. Give narrower tolerances."
             )
         facts = {
             "goal": self.goal,

@@ -12,6 +12,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.optimize import Limits
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -146,10 +147,11 @@ class SobolAnswer(ShortRepr, Reported):
         from ballpass.runtime.ask.variance_shares import wilson
 
         parts: list[Any] = []
-        rows = [
-            (one.name, *(f"{v:.5g}" for v in (one.mean, one.deviation, *one.quantiles, one.least, one.most)), one.unit)
-            for one in self.quantities
-        ]
+        rows = []
+        for one in self.quantities:
+            factor, unit = table_unit(one.unit)
+            numbers = (one.mean, one.deviation, *one.quantiles, one.least, one.most)
+            rows.append((one.name, *(f"{factor * number:.5g}" for number in numbers), unit))
         right = ("mean", "deviation", "5 %", "50 %", "95 %", "least", "most")
         heads = ("quantity", *right, "unit")
         parts.append(ReportTable(title=f"{self.members} members", heads=heads, rows=rows, right=right))
@@ -320,7 +322,8 @@ def sobol(
         known = column[np.isfinite(column)]
         hits = int(np.count_nonzero(known <= one.limit if one.upper else known >= one.limit))
         low, high = wilson(hits, len(known))
-        words = f"{one.quantity} {'<=' if one.upper else '>='} {one.limit:g} {one.unit}"
+        factor, unit = table_unit(one.unit)
+        words = f"{one.quantity} {'<=' if one.upper else '>='} {factor * one.limit:g} {unit}"
         share = hits / len(known) if len(known) else math.nan
         kept.append(KeptLimit(words=words, kept=hits, members=len(known), share=share, low=low, high=high))
     return SobolAnswer(
