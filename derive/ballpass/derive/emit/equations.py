@@ -159,7 +159,10 @@ def _definitions(tex: _Printer, definitions: Iterable[Definition]) -> list[str]:
 
 
 def _line(tex: _Printer, definition: Definition, right: str) -> str:
-    return f"{definition.description} [{_unit(definition.unit)}]\n\n" + _wrapped(definition.latex, right)
+    words = f"{definition.description} [{_unit(definition.unit)}]"
+    if right == definition.latex:  # a parameter itself, which has the same symbol
+        return f"{words}: ${right}$ as given."
+    return f"{words}\n\n" + _wrapped(definition.latex, right)
 
 
 def _linear_equations(tex: _Printer, matrix: sp.Matrix, unknowns: sp.Matrix, right: sp.Matrix) -> list[str]:

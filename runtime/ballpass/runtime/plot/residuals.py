@@ -42,8 +42,9 @@ def draw_residuals(
     above.legend(loc="upper right")
     left = (model - measured) / noise
     below.plot(t, left, ".", color=INK, markersize=dot, rasterized=True)
-    for level in (-1.96, 1.96):
-        below.axhline(level, color=SIGNAL, linewidth=1.0, linestyle=(0, (5, 2)))
+    for level, words in ((-1.96, None), (1.96, "95 % of white noise")):
+        below.axhline(level, color=SIGNAL, linewidth=1.0, linestyle=(0, (5, 2)), label=words)
+    below.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
     below.set_xlabel(along)
     below.set_ylabel("difference over noise")
     away = left - np.mean(left)

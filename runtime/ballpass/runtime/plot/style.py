@@ -130,13 +130,22 @@ def new_figure(height: float, *, layout: Literal["constrained"] | None = "constr
 
 
 def frame(
-    figure: Figure, title: str, text: str, *, left: float = 0.82, right: float = 0.2, below: float = 0.6, **gaps: float
+    figure: Figure,
+    title: str,
+    text: str,
+    *,
+    left: float = 0.82,
+    right: float = 0.2,
+    below: float = 0.6,
+    above: float = 0.0,
+    **gaps: float,
 ) -> None:
     """Title above and the axes below it, by margins [inch]; the caption as `caption_of` gives it.
 
     Parameters
     ----------
     below : room for ticks and label of the x axis
+    above : further room between title and axes
     gaps : ``wspace`` and ``hspace`` between axes, in parts of their size
     """
     width, height = figure.get_size_inches()
@@ -146,7 +155,7 @@ def frame(
         left=left / width,
         right=1.0 - right / width,
         bottom=below / height,
-        top=1.0 - (0.4 + 0.21 * len(title.splitlines())) / height,
+        top=1.0 - (0.4 + above + 0.21 * len(title.splitlines())) / height,
         **gaps,
     )
 

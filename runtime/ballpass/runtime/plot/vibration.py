@@ -28,6 +28,12 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "BPFI": {"color": SAND, "linestyle": (0, (4, 1.5)), "linewidth": 1.4},
     "2 BSF": {"color": "#5b8e7d", "linestyle": (0, (3, 1, 1, 1)), "linewidth": 1.2},
 }
+#: Head of the marks of a scene's first, second, ... bearing.
+_HEADS = ("", "o", "s", "^", "D")
+
+#: Width of the legend, of a handle and of a letter in it, height of its rows [inch].
+_LEGEND, _HANDLE, _LETTER, _ROW = 7.4, 0.5, 0.062, 0.19
+
 #: Place of a legend: right above the axes.
 _ABOVE: dict[str, Any] = {
     "loc": "lower right",
@@ -70,19 +76,29 @@ def draw_lines(
     axes.set_xlim(0.0, limit)
     unit = " Hz" if across.endswith("[Hz]") else ""
     looks = []
+    bearings = list(dict.fromkeys(mark.bearing for mark in marks if mark.name != "shaft"))
     for mark in marks:
         every = mark.frequency * np.arange(1, (1 if mark.name == "FTF" else MARKED) + 1)
-        look = _LOOKS[mark.name]
-        axes.vlines(every[every <= limit], 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
-        looks.append((Line2D([], [], **look | {"linewidth": 1.6}), f"{mark.label} {mark.frequency:.4g}{unit}"))
+        every, look = every[every <= limit], _LOOKS[mark.name]
+        head = _HEADS[bearings.index(mark.bearing) % len(_HEADS)] if mark.name != "shaft" else _HEADS[0]
+        axes.vlines(every, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
+        if head:
+            heads = {"marker": head, "color": look["color"], "linestyle": "none", "markersize": 5.0}
+            axes.plot(every, np.full(len(every), 0.97), transform=axes.get_xaxis_transform(), **heads)
+        line = Line2D([], [], marker=head, markersize=5.0, **look | {"linewidth": 1.6})
+        looks.append((line, f"{mark.label} {mark.frequency:.4g}{unit}"))
     axes.plot(position[shown], np.maximum(height[shown], FLOOR * peak), color=INK, linewidth=1.0)
     axes.grid(visible=False, axis="x")
     axes.set_xlabel(across)
     axes.set_ylabel(up)
+    rows = 1
     if looks:
-        axes.legend(*zip(*looks, strict=True), ncols=min(len(looks), 5), **_ABOVE)
+        longest = max(len(words) for _, words in looks)
+        columns = min(len(looks), max(int(_LEGEND / (_HANDLE + _LETTER * longest)), 1), 5)
+        rows = -(-len(looks) // columns)
+        axes.legend(*zip(*looks, strict=True), ncols=columns, **_ABOVE)
         text += f" Marked: characteristic frequencies and multiples up to {MARKED}."
-    frame(figure, title, text, left=1.1)
+    frame(figure, title, text, left=1.1, above=_ROW * (rows - 1))
     return figure
 
 
