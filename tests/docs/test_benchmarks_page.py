@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from benchmarks import waviness
 from benchmarks.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,3 +26,8 @@ def test_page_of_the_benchmarks_is_drawn_from_its_results(tmp_path: Path, capsys
     with pytest.raises(SystemExit):
         main(["--draw", "--out", str(tmp_path)])
     assert "results of 2 commits: " in capsys.readouterr().err
+
+
+def test_page_on_effects_says_what_was_measured_of_waviness() -> None:
+    found = json.loads(waviness.RESULTS.read_text(encoding="utf-8"))
+    assert waviness.sentence(found) in (ROOT / "docs" / "theory" / "effects.md").read_text(encoding="utf-8")

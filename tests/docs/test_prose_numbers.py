@@ -8,11 +8,13 @@ was measured then.
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
+from benchmarks import waviness
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -224,6 +226,9 @@ NAMED: dict[str, dict[str, str]] = {
         "25.588 µm and 41.406 µm": "test_spalls.py",
         "a chord of 1 mm in a 6204": "what test_spalls.py measures",
         "a rotor with 8 balls": "the 6204 of rotor.toml",
+        waviness.sentence(
+            json.loads(waviness.RESULTS.read_text(encoding="utf-8"))
+        ): "measured; test_benchmarks_page.py",
     },
     "docs/theory/errata.md": {
         "bottom dead centre is at 270°, the window ends 3° before it": "geometry",
