@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,7 @@ def measure(rounds: int) -> dict[str, Any]:
         return model.simulate(cycles=1, transient=0, outputs=[], samples_per_cycle=2).statistics
 
     steps = {name: turn(model).steps for name, model in models.items()}
-    times = interleave([lambda model=model: turn(model) for model in models.values()], rounds)
+    times = interleave([partial(turn, model) for model in models.values()], rounds)
     seconds = dict(zip(models, times.T, strict=True))
     found: dict[str, Any] = {"steps": steps, "operations": operations}
     for name in ("constant", "motor"):
