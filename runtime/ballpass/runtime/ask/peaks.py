@@ -146,7 +146,7 @@ def _of_any_ball(solution: Solution, name: str, kind: Kind) -> bool:
 
 
 def _of_samples(solution: Solution, name: str, kind: Kind) -> Peak:
-    if kind not in SIGNS:
+    if not (isinstance(kind, str) and kind in SIGNS):
         raise RequestError(f"kind: 'max' or 'min' is expected, not {kind!r}.")
     samples = solution[name]  # unknown names are refused with the nearest known ones
     if not len(solution):
