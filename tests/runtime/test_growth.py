@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,8 @@ from typer.testing import CliRunner
 from ballpass.derive import generate
 from ballpass.runtime import Model, SimulationError, load
 from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.app.summary_words import stands_out
 from ballpass.runtime.certify.error_target import TargetMissed
 from ballpass.runtime.certify.growth import DIGITS
 
@@ -162,3 +165,14 @@ def test_two_runs_that_agree_by_luck_are_no_proof(tmp_path: Path) -> None:
     (estimate,) = missed.value.best.estimates.values()
     (value,) = missed.value.best.values.values()
     assert max(abs(each / value - 1.0) for each in highest) < 10.0 * estimate
+    # and digits of channels that keep nearly four: a peak of 3137.5 to 3138.5 N was printed as 3138
+    length = {"cycles": 20, "transient": 14}
+    summary = summarize(model, model.simulate(**length), model.growth(**length))
+    (said,) = stands_out(model.manifest, {**model.parameters, **model.constants()}, summary)
+    force, apart = re.findall(r"force: (\d+) ±(\S+) N", said)[0]
+    assert 0.0 < float(apart) < 3.0
+    tight = [
+        model.reduce(**length, rtol=1e-9, kinks="located", initial=start)["ball.force"].maximum
+        for start in (None, np.array([1e-10, 0, 0, 0, 0, 0, 0, 0]))
+    ]
+    assert np.max(np.abs(np.array(tight) - float(force))) < 2.0 * float(apart) + 0.5

@@ -62,8 +62,8 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
 
     Parameters
     ----------
-    growth : of perturbations, where it was computed; numbers that the tolerance does not determine then get the
-        mean and the standard deviation over moved starts (``over_starts``)
+    growth : of perturbations, where it was computed; numbers of a motion that amplifies them then get the mean and
+        the standard deviation over moved starts (``over_starts``)
 
     Returns
     -------
@@ -108,7 +108,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     summary |= _constants(steady)
     if growth is not None:
         summary["growth"] = _numbers("growth", "1", value=growth.worst, moved=growth.moved)
-        for name in growth.uncertain:
+        for name in dict.fromkeys(channel for _, channel in growth.spread):
             _add_spread(summary, growth, name)
     summary["versions"] = _versions(steady)
     found = _unusual(steady)
@@ -223,7 +223,7 @@ def _moments(of: Reduction | SignalStatistics) -> dict[str, float]:
 
 
 def _add_spread(summary: dict[str, Any], growth: Growth, name: str) -> None:
-    """Mean and standard deviation over moved starts, beside the numbers of a channel that have no digits."""
+    """Mean and standard deviation over moved starts, beside the numbers of a channel."""
     prefix, of_ball, force = name.rpartition("ball.")
     keys = {kind: kind for kind in ("min", "max", "rms")}
     entry = summary.get(name)

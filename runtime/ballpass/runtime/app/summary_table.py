@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ballpass.runtime.app.summary_words import row_place, row_words
+from ballpass.runtime.app.summary_words import row_place, row_words, written
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.report.report import ReportTable
@@ -84,7 +84,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
         rows=[row for _, row in rows],
         right=columns,
         wrapped=() if every else ("",),
-        caption=_caption(summary, every=every),
+        caption=_caption(summary, every=every, uncertain=any("±" in cell for _, cells in rows for cell in cells)),
     )
     return table, left_out
 
@@ -101,22 +101,13 @@ def _rounding(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -> str:
-    """A number of the table, with a star where more samples may show more; 0 where it is rounding alone.
-
-    Where it has no digits, with twice its standard deviation over moved starts, or how far it is from their mean.
-    """
+    """A number of the table, with a star where more samples may show more; 0 where it is rounding alone."""
     if key not in item:
         return ""
     if abs(item[key]) < dust:
         return "0"
-    spread = item.get("over_starts", {}).get(key)
-    if spread is not None:
-        apart = max(2.0 * spread["std"], abs(item[key] - spread["mean"]))
-        if apart < 5e-5 * abs(item[key]):  # the digits that are printed hold
-            return f"{factor * item[key]:z.4g}"
-        return f"{factor * item[key]:z.3g}\n±{factor * apart:.1g}"  # below it: three of these fill a line
-    star = "*" if item.get("searched", {}).get(key) == "samples" else ""
-    return f"{factor * item[key]:z.4g}{star}"
+    number = written(item, key, factor, "\n")  # ± below it: three of these fill a line
+    return number + ("*" if item.get("searched", {}).get(key) == "samples" and "±" not in number else "")
 
 
 def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
@@ -146,7 +137,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
     )
 
 
-def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
+def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str:
     run = [
         words.format(f"{summary[key]['value']:.4g}")
         for key, words in _RUN.items()
@@ -158,7 +149,7 @@ def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
         if key == "damping_law" or key.endswith(".damping_law")
     )
     law = [f"damping law {laws}"] if laws else []
-    if any("over_starts" in item for item in summary.values() if isinstance(item, Mapping)):
+    if uncertain:
         law.append("± twice the standard deviation over moved starts, or the distance from their mean")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]

@@ -74,6 +74,25 @@ def row_words(manifest: Manifest, name: str) -> str:
     return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
 
 
+def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> str:
+    """A number of the summary with four digits, or with those that hold over moved starts, and its uncertainty.
+
+    That is twice the standard deviation over moved starts, or the distance of the number from their mean.
+
+    Parameters
+    ----------
+    between : number and uncertainty
+    """
+    value, spread = item[key], item.get("over_starts", {}).get(key)
+    if spread is None or value == 0.0:
+        return f"{factor * value:z.4g}"
+    apart = max(2.0 * spread["std"], abs(value - spread["mean"]))
+    if apart < 5e-5 * abs(value):  # all of four
+        return f"{factor * value:z.4g}"
+    digits = min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(apart)) + 1, 1), 4)
+    return f"{factor * value:z.{digits}g}{between}±{factor * apart:.1g}"
+
+
 def inside(words: str) -> str:
     """Words of a row within a sentence."""
     return words[:1].lower() + words[1:]
@@ -113,8 +132,9 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
         if pressure > element.static_pressure:
             beyond.append(element)
         whose = f" of {bearing.name}" if bearing.name else ""
+        number = written(peak, "total", 1.0, " ")
         said.append(
-            f"Highest {element.noun} force{whose}: {force:.4g} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} "
+            f"Highest {element.noun} force{whose}: {number} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} "
             "raceway."
         )
     limits = {element.noun: element.static_pressure for element in beyond}

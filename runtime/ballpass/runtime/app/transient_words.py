@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ballpass.runtime.app.summary_words import inside, row_words
-from ballpass.runtime.certify.growth import largest_first
+from ballpass.runtime.app.summary_words import inside, row_place, row_words
 from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
@@ -21,6 +20,9 @@ from ballpass.runtime.run.settle import look_beyond
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.settle import Settled
+
+#: Channels that a warning names.
+SHOWN = 4
 
 
 def warnings_of_transient(
@@ -62,10 +64,14 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     names = remembered(found)
     if not names:
         return []
+    # what a reader wants first; channels that are all but nothing may change by more
+    names.sort(key=lambda n: (not n.endswith("ball.force"), row_place(model.manifest, n) is None, -found.changes[n]))
+    first = ", ".join(f"{name} by {100.0 * found.changes[name]:.2g} %" for name in names[:SHOWN])
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return [
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
         f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
-        f"{largest_first({name: found.changes[name] for name in names})}. Give a run with a longer "
+        f"{first}{more}. Give a run with a longer "
         "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
     ]
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from ballpass.runtime.certify.method_choice import MethodChoice, stepper_run
 from ballpass.runtime.contract.defaults import TOLERANCES
-from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.members import Table
@@ -88,7 +88,8 @@ class Growth(ShortRepr):
     parted : how far the states are apart at the end of the run, in their magnitudes [1]
     steps : of the run
     lost : of channels whose numbers errors of the steps put off by more than their digits: by how much [1]
-    spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
+    spread : by ("min", "max" or "rms", channel), where anything is uncertain or the states part: mean and standard
+        deviation over `STARTS` moved starts
     """
 
     moved: float
@@ -144,10 +145,15 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
     Raises
     ------
     RequestError
-        A wrong request, or no compiler for the stepper.
+        A wrong request, a model without states, or no compiler for the stepper.
     SimulationError
         The computation failed.
     """
+    if not model.states:
+        raise RequestError(
+            f"{model.manifest.scene}: growth is that of a motion that is integrated. This model has no states: its "
+            "outputs follow from time alone. A scene with [bearing] or [mechanism.driver.torque] has some."
+        )
     run = stepper_run(model, numbers, request)
     way = _way(run, request.kinks)
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
@@ -273,8 +279,7 @@ def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
         changes[name] = max(changes[name], _relative(middle + 2.0 * apart, middle))
     uncertain = tuple(name for name in channels if name in found.uncertain or changes[name] > DIGITS)
     spread = dict(zip(names, zip(mean.tolist(), deviation.tolist(), strict=True), strict=True))
-    kept = {key: value for key, value in spread.items() if key[1] in uncertain}
-    return replace(found, changes=changes, uncertain=uncertain, spread=kept)
+    return replace(found, changes=changes, uncertain=uncertain, spread=spread)
 
 
 def simulate_members(
