@@ -524,3 +524,20 @@ def test_a_misspelt_table_that_decides_about_other_keys_is_one_fault() -> None:
     text = edited((SCENES / "engine.toml").read_text(encoding="utf-8"), "forces.gas.table]", "forces.gas.tabel]")
     (fault,) = faults(text, "engine").faults
     assert (fault.key, fault.remedy) == ("mechanism.forces.gas.tabel", 'did you mean "table"?')
+
+
+def test_missing_tables_of_a_bearing_are_shown_as_they_can_be_written() -> None:
+    """With what is allowed there written into it, the scene is read."""
+    text = """
+        shaft.speed = "3000 rpm"
+        load = { type = "constant", force = ["0 N", "-100 N"] }
+        [bearing]
+        designation = "6204"
+        clearance = "10 um"
+    """
+    missing = faults(text, "rotor").faults
+    assert len(missing) == 3
+    for fault in missing:
+        table, keys = fault.allowed.split(" with ")
+        text += "\n".join(("", table, *keys.split(" and ")))
+    assert scene_from_text(text, "rotor").bearings

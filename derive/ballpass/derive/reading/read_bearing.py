@@ -185,7 +185,7 @@ def _refuse_angle(table: Table, element: RollingElement) -> None:
 
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:
-    with table.table("damping", "law and ratio") as damping:
+    with table.table("damping", 'law = "tangent" and ratio = "0.25e-5 s"') as damping:
         name = LAW.read(damping, "law")
         if name is None:
             damping.know(*damping.data)
@@ -217,7 +217,7 @@ def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
-    with table.table("inner_ring", "mass or equivalent_mass") as ring:
+    with table.table("inner_ring", 'mass = "0.4 kg"') as ring:
         chosen = MASS.choose(ring, keys_of(InnerRing))
         ring.missing = ring.missing or not chosen
         if chosen != ("equivalent_mass",):
@@ -234,7 +234,7 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
 
 
 def _read_outer_ring(table: Table) -> OuterRing | None:
-    with table.table("outer_ring", "support") as ring:
+    with table.table("outer_ring", 'support = "fixed"') as ring:
         support, keys = SUPPORT.read(ring, "support"), keys_of(OuterRing)
         ring.know(*keys)
         if support == "elastic":

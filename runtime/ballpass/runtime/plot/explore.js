@@ -122,8 +122,11 @@ function resultsOf(run) {
 
 const difference = (now, old) => {
   if (now === old) return "\u2013";
-  const share = 100 * (now - old) / Math.abs(old);
-  return Number.isFinite(share) ? `${share > 0 ? "+" : "\u2212"}${Math.abs(share) < 1000 ? Math.abs(share).toPrecision(3) : Math.abs(share).toExponential(1)} %` : "new";
+  const ratio = now / old, share = 100 * (now - old) / Math.abs(old);
+  if (!Number.isFinite(share)) return "new";
+  if (ratio >= 10) return `\u00d7${written(ratio, 3)}`;
+  if (ratio > 0 && ratio <= 0.01) return `\u00f7${written(1 / ratio, 3)}`;
+  return `${share > 0 ? "+" : "\u2212"}${written(Math.abs(share), 3)} %`;
 };
 
 function showResults(results, olds) {
