@@ -1,6 +1,6 @@
 """Moments at which an output has a kink, so that integrals over it are taken piece by piece.
 
-In: deflections of the balls and other signals along a run.  Out: times.
+In: deflections of the balls, their rates and other signals along a run.  Out: times.
 
 Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope.
 Where a law damps one way only, the force has a corner.  Where another ball becomes the most loaded one, the largest
@@ -11,8 +11,6 @@ that the panels need not move with the kink.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +41,10 @@ def crossings(t: Array, segment: NDArray[np.int_], *signals: Array) -> Array:
     found = np.concatenate([np.zeros(0, dtype=np.int_), *places])
     if not len(found):
         return np.zeros(0)
-    # four nodes around, all of the same segment; where there are too few, those at its end twice removed
-    rows = np.clip(found - 1, 0, len(t) - 4)[:, None] + np.arange(4)
+    # four nodes of the same segment around; a straight line where it has fewer
+    first, last = np.searchsorted(segment, segment[found]), np.searchsorted(segment, segment[found], side="right")
+    begin = np.clip(np.minimum(np.maximum(found - 1, first), last - 4), 0, max(len(t) - 4, 0))
+    rows = np.minimum(begin[:, None] + np.arange(4), len(t) - 1)
     whole = np.all(segment[rows] == segment[found][:, None], axis=1) & np.all(np.diff(t[rows], axis=1) > 0.0, axis=1)
     low, high, nodes = t[found].copy(), t[found + 1].copy(), t[rows]
     of = np.repeat(np.arange(len(signals)), [len(place) for place in places])
@@ -73,52 +73,36 @@ def _cubic(nodes: Array, values: Array, at: Array) -> Array:
     return total
 
 
-def rate_of(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
-    """Time derivative of signals along nodes by differences within each segment, shape of `signal`."""
-    rate = np.zeros_like(signal)
-    for k in np.unique(segment).tolist():
-        rows = np.flatnonzero(segment == k)
-        kept = rows[np.concatenate([[True], np.diff(t[rows]) > 0.0])]
-        if len(kept) >= 3:
-            found = np.gradient(signal[kept], t[kept], axis=0)
-            rate[rows] = found[np.searchsorted(t[kept], t[rows], side="right") - 1]
-    return rate
-
-
-def find_kinks(
-    t: Array,
-    segment: NDArray[np.int_],
-    deflections: Sequence[Array],
-    ranked: Sequence[Array],
-    *,
-    one_sided: bool,
-    length: float,
-    edges: Array,
-) -> list[float]:
-    """Times of kinks of outputs of the balls, increasing, apart from each other and from the edges [s].
+def find_kinks(t: Array, segment: NDArray[np.int_], signals: Array, *, length: float, edges: Array) -> Array:
+    """Times at which signals pass zero, increasing, apart from each other and from the edges [s].
 
     Parameters
     ----------
-    t, segment : nodes, shape (n,)
-    deflections : of the balls of each bearing, shape (n, balls), and of each stop, shape (n, 1) [m]
-    ranked : channels of which only the most loaded ball's value counts, shape (n, balls)
-    one_sided : whether a damping law has a corner at rate zero
+    t, segment : places, shape (n,)
+    signals : shape (n, signals)
     length : of the time that counts [s]
     edges : times that are edges already [s]
     """
-    signals = [column for table in deflections for column in table.T]
-    if one_sided:
-        signals += [column for table in deflections for column in rate_of(t, segment, table).T]
-    for table in ranked:
-        best = np.argmax(table, axis=1)
-        pairs = {
-            (int(best[k]), int(best[k + 1])) for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
-        }
-        # a crossing of two less loaded balls is no kink; the extra cut does no harm
-        signals += [table[:, a] - table[:, b] for a, b in sorted({(min(pair), max(pair)) for pair in pairs})]
     kept: list[float] = []
-    for time in np.sort(crossings(t, segment, *signals)).tolist():
+    for time in np.sort(crossings(t, segment, *signals.T)).tolist():
         last = kept[-1] if kept else -np.inf
         if time - last > APART * length and np.min(np.abs(edges - time)) > APART * length:
             kept.append(time)
-    return kept
+    return np.array(kept)
+
+
+def rank_differences(segment: NDArray[np.int_], table: Array) -> Array:
+    """Differences that pass zero where another ball becomes the most loaded one, shape (n, pairs).
+
+    Those of two less loaded balls may be among them; a panel that ends there does no harm.
+
+    Parameters
+    ----------
+    table : forces of the balls, shape (n, balls)
+    """
+    best = np.argmax(table, axis=1)
+    changes = np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
+    pairs = sorted(
+        {(min(pair), max(pair)) for pair in zip(best[changes].tolist(), best[changes + 1].tolist(), strict=True)}
+    )
+    return table[:, [a for a, _ in pairs]] - table[:, [b for _, b in pairs]]

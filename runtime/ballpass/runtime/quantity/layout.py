@@ -20,12 +20,13 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
-from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks
+from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks, rank_differences
 from ballpass.runtime.quantity.nodes import Edges, NodePlan, Nodes, make_edges, no_nodes, place, with_passages
 from ballpass.runtime.quantity.panels import (
     GAUSS,
     Panels,
     cut_at,
+    interpolated,
     panels_between,
     parts_needed,
     plan_of,
@@ -111,6 +112,9 @@ class NodeLayer:
     def __init__(self, model: LoadedModel, channels: ChannelValues, *, rough: float, along_nodes: bool) -> None:
         self.model = model
         self._channels, self._rough, self._along_nodes = channels, rough, along_nodes
+        # among the quantities of every bearing, whether or not the scene's outputs name them
+        names = [bearing.prefix + DEFLECTION for bearing in model.manifest.bearings]
+        self._deflections = ChannelValues(model, [*names, *model.manifest.stops])
 
     def is_still(self, quantity: Quantity) -> bool:
         """Whether a quantity follows from time alone."""
@@ -170,28 +174,47 @@ class NodeLayer:
         assert layout.panels is not None
         assert layout.track is not None
         passages = find_passages(run, layout.track) if not layout.still else layout.passages
-        shared: dict[bytes, tuple[Panels, list[Quantity]]] = {}
         edges = layout.edges
         if passages.edges:
             edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
+        each = []
         for item in layout.items:
             # an extreme where a load begins moves with it, so that extremes need passages as well
             panels = panels_between(edges, ends, kinks) if passages.edges else layout.panels
             if not self._is_found(item):
                 panels = panels if passages.edges else split(panels, self._parts(layout, item))
-                panels = cut_at(panels, edges, self._kinks(run, layout.track, layout.signals, item))
-            key = panels.low.tobytes() + panels.begin.tobytes()
-            shared.setdefault(key, (panels, []))[1].append(item)
+                panels = cut_at(panels, edges, self._kinks(run, layout, item))
+            each.append((item, panels))
         found = []
-        for panels, items in shared.values():
-            here = replace(layout, items=tuple(items))
-            if panels is layout.panels:
-                found.append(here)
-                continue
-            here = self._along(run, replace(here, edges=edges, passages=passages), panels)
+        for here in self._each_along(run, replace(layout, edges=edges, passages=passages), each):
             # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
-            found += self._refined(run, here, ends, kinks, passes - 1) if layout.still and passes > 1 else [here]
+            again = layout.still and passes > 1 and here.panels is not layout.panels
+            found += self._refined(run, here, ends, kinks, passes - 1) if again else self._ranked(run, here)
         return found
+
+    def _each_along(self, run: Run, layout: Layout, each: Sequence[tuple[Quantity, Panels]]) -> list[Layout]:
+        """The run along the nodes of each quantity: those that need the same ones share them."""
+        shared: dict[bytes, tuple[Panels, list[Quantity]]] = {}
+        for item, panels in each:
+            shared.setdefault(panels.low.tobytes() + panels.begin.tobytes(), (panels, []))[1].append(item)
+        groups = [(panels, replace(layout, items=tuple(items))) for panels, items in shared.values()]
+        return [here if panels is layout.panels else self._along(run, here, panels) for panels, here in groups]
+
+    def _ranked(self, run: Run, layout: Layout) -> list[Layout]:
+        """Panels that end where another ball becomes the most loaded one, for quantities of that ball.
+
+        The balls' forces are smooth within the panels, so that two changes between two nodes are found as well.
+        """
+        assert layout.panels is not None
+        each = []
+        for item in layout.items:
+            times = np.zeros(0)
+            if self._is_kinked(item) and _is_of_balls(item) and item.ball is None and not kind_of(item).steep:
+                t, segment, table = _between_nodes(layout, layout.signals[item.channel].value)
+                signals = rank_differences(segment, table)
+                times = find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times)
+            each.append((item, cut_at(layout.panels, layout.edges, times)))
+        return self._each_along(run, layout, each)
 
     def _parts(self, layout: Layout, item: Quantity) -> NDArray[np.int_]:
         """Into how many parts each panel is to be split; none where there would be too many."""
@@ -206,34 +229,20 @@ class NodeLayer:
         parts, most = np.maximum(parts_needed(each, self._rough), least), max(MOST, 2 * len(GAUSS) * len(layout.panels))
         return parts if len(GAUSS) * np.sum(parts) <= most else np.ones_like(parts)
 
-    def _kinks(self, run: Run, track: Track, signals: Mapping[str, Signal], item: Quantity) -> Array:
+    def _kinks(self, run: Run, layout: Layout, item: Quantity) -> Array:
         """Times of kinks of an integrated channel, beside those on which steps end [s]."""
-        if kind_of(item).extremes or item.channel in self.model.states:
-            return np.zeros(0)
-        of_balls = ".ball." in f".{item.channel}"
-        ranked = of_balls and item.ball is None and not kind_of(item).steep
-        tables = [signals[item.channel].value] if ranked else []
-        bearings, stops = self.model.manifest.bearings, self.model.manifest.stops
         # a corner of the damping at rest is in the force of each ball, and not in the motion
-        corner = of_balls and any(bearing.damping.corner_at_rest for bearing in bearings)
-        deflections: list[Array] = []
-        if run.kinks != LOCATED or corner:
-            # among the quantities of every bearing, whether or not the scene's outputs name it
-            names = [bearing.prefix + DEFLECTION for bearing in bearings] + [*stops]
-            found = ChannelValues(self.model, names).along(track, run.numbers)
-            deflections = [found[name].value for name in names]
-        nodes = track.nodes
-        return np.array(
-            find_kinks(
-                nodes.t,
-                nodes.segment,
-                deflections,
-                tables,
-                one_sided=corner,
-                length=run.duration,
-                edges=track.edges.times,
-            )
-        )
+        corner = _is_of_balls(item) and any(bearing.damping.corner_at_rest for bearing in self.model.manifest.bearings)
+        if not self._is_kinked(item) or not self._deflections.channels or not (corner or run.kinks != LOCATED):
+            return np.zeros(0)
+        assert layout.track is not None
+        values, rates = self._deflections.with_rates(layout.track, run.numbers)
+        t, segment, signals = _between_nodes(layout, np.hstack([values, rates]) if corner else values)
+        return find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times)
+
+    def _is_kinked(self, item: Quantity) -> bool:
+        """Whether a quantity integrates an output."""
+        return not self._is_found(item) and not kind_of(item).extremes and item.channel not in self.model.states
 
     def _with_extremes(self, run: Run, layout: Layout, row: Array) -> Layout:
         """The same with the extremes of its quantities, and the next ones."""
@@ -287,6 +296,17 @@ def channels_of(quantities: Iterable[Quantity]) -> list[str]:
         beside = (item.channel.removesuffix("ball.force") + name for name in kind_of(item).beside)
         names |= dict.fromkeys((item.channel, *beside))
     return list(names)
+
+
+def _between_nodes(layout: Layout, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:
+    """Times, intervals and signals at places between the nodes of panels too."""
+    assert layout.track is not None
+    assert layout.panels is not None
+    return interpolated(layout.panels, layout.edges, signals[np.flatnonzero(layout.track.nodes.weight)])
+
+
+def _is_of_balls(quantity: Quantity) -> bool:
+    return ".ball." in f".{quantity.channel}"
 
 
 def needs(quantity: Quantity) -> tuple[str, ...]:

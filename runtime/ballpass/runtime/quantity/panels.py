@@ -27,6 +27,12 @@ GAUSS, WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
 #: Weights of the nodes' values that give the part of third degree (Legendre).
 _THIRD = 7.0 * WEIGHTS * (2.5 * _GAUSS**3 - 1.5 * _GAUSS)
 
+#: Places in a panel between which a signal is taken to pass zero at most once.
+BETWEEN = np.linspace(0.0, 1.0, 9)
+
+#: Matrix that takes values at the nodes to these places, by the polynomial through them.
+_TO_BETWEEN = np.vander(2.0 * BETWEEN - 1.0, 4) @ np.linalg.inv(np.vander(_GAUSS, 4))
+
 #: Fewest panels in a turn where no steps are taken: of outputs that follow from time alone.
 FEWEST = 256
 
@@ -126,9 +132,10 @@ def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panel
         first, last = np.searchsorted(cuts, [left - near, right + near])
         inner, kink = cuts[first:last], kinks[first:last]
         free = (inner > left + near) & (inner < right - near)
-        ends = np.concatenate([[0.0], (inner[free] - left) / (right - left), [1.0]])
+        places, on_kink = _distinct(inner[free], kink[free], near)
+        ends = np.concatenate([[0.0], (places - left) / (right - left), [1.0]])
         at = np.concatenate(
-            [[bool(np.any(kink[inner <= left + near]))], kink[free], [bool(np.any(kink[inner >= right - near]))]]
+            [[bool(np.any(kink[inner <= left + near]))], on_kink, [bool(np.any(kink[inner >= right - near]))]]
         )
         kept = _apart_from_kinks(ends, at)
         ends, at = ends[kept], at[kept]
@@ -137,6 +144,14 @@ def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panel
         high.append(ends[1:])
         kinked.append(np.stack([at[:-1], at[1:]], axis=1))
     return _spans(np.concatenate(segment), np.concatenate(low), np.concatenate(high), np.concatenate(kinked))
+
+
+def _distinct(places: Array, kinks: NDArray[np.bool_], near: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Increasing places, those that are nearer to each other than `near` as one, which is a kink if one of them is."""
+    if not len(places):
+        return places, kinks
+    first = np.flatnonzero(np.diff(places, prepend=-np.inf) > near)
+    return places[first], np.logical_or.reduceat(kinks, first)
 
 
 def _apart_from_kinks(ends: Array, at: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -189,6 +204,23 @@ def parts_needed(signals: Sequence[Array], rough: float) -> NDArray[np.int_]:
             third = np.einsum("i,pic->pc", _THIRD, signal.reshape(-1, len(GAUSS), signal.shape[1]))
             most = np.maximum(most, np.max(np.abs(third), axis=1) / extent)
     return np.clip(np.ceil(np.cbrt(most / rough)), 1, PARTS).astype(np.int_)
+
+
+def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:
+    """Times of places in each panel, both ends among them, the panels' indices, and signals there.
+
+    Parameters
+    ----------
+    signals : at the nodes of the panels, smooth in each, shape (4 panels, columns)
+
+    Returns
+    -------
+    shapes (places,) [s], (places,) and (places, columns)
+    """
+    left, right = edges.times[panels.segment], edges.times[panels.segment + 1]
+    times = left[:, None] + panels.at(BETWEEN)[0] * (right - left)[:, None]
+    values = _TO_BETWEEN @ signals.reshape(len(panels), len(GAUSS), -1)
+    return times.ravel(), np.repeat(np.arange(len(panels)), len(BETWEEN)), values.reshape(times.size, -1)
 
 
 def cut_at(panels: Panels, edges: Edges, times: Array) -> Panels:

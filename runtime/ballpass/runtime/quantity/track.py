@@ -230,6 +230,17 @@ class ChannelValues:
         columns = dict(zip((info.name for info in infos), results.values(), strict=True))
         return found | {info.name: columns[info.name] for info in self._outputs}
 
+    def with_rates(self, track: Track, numbers: Numbers) -> tuple[Array, Array]:
+        """Channels that are no states along a track, and their time derivatives, shape (nodes, columns) each.
+
+        They follow from time and positions alone.
+        """
+        if not hasattr(self._own, "rates"):
+            self._own.rates = Loop(self._function(self._rows_with_rates), ("t", "x", "u"))
+        every = self._own.rates(len(track.nodes), self._given(track, numbers))["g"]
+        values, rates = np.split(every, 2, axis=1)
+        return values, rates
+
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         if self._derivatives is None:
             self._derivatives = self._loop()
@@ -296,6 +307,12 @@ class ChannelValues:
             order = [info.name for info in self._model.manifest.outputs]
             found = [results[order.index(info.name)] for info in self._outputs]
         return found + self._more_rows(inputs)
+
+    def _rows_with_rates(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        values, x = casadi.vertcat(*self._all_rows(inputs)), inputs["x"]
+        half = x.numel() // 2
+        moved = casadi.vertcat(1.0, x[half:], casadi.SX.zeros(half))
+        return [values, casadi.jtimes(values, casadi.vertcat(inputs["t"], x), moved)]
 
     def _more_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         found = []
