@@ -175,7 +175,13 @@ def _checked(
     return ForcingPeriod(rate=period.rate, count=period.count, words=period.words, difference=difference)
 
 
-def _turned(name: str, turns: Fraction, alike: int) -> str:
+#: What turns, by its speed.
+_TURNING = {"mechanism.driver.speed": "the driver", "shaft.speed": "the shaft"}
+
+
+def _turned(rate: str, turns: Fraction, alike: int) -> str:
+    path, _, kind = rate.rpartition(".")
+    name = f"the cage of {path}" if kind == "cage_speed" else _TURNING.get(rate, rate)
     if alike > 1 and turns.denominator > 1:
         pitches = turns * alike
         return f"{name} turns by {_count(pitches, 'ball pitch', 'ball pitches')}, balls renumbered by {pitches % alike}"
