@@ -64,7 +64,10 @@ def test_a_worker_without_a_compiler_says_which_it_is(
     packed = cluster.pack(make_model("rotor"))
     workshop = cluster._Workshop()
     workshop.take([packed])
+    worker = f"The worker on {socket.gethostname()}, process {os.getpid()}"
+    monkeypatch.setenv("CC", "/no/such/cc")  # which did not say that it is a worker's
+    with pytest.raises(RequestError, match=f"{worker}: the environment variable CC names '/no/such/cc'"):
+        workshop.model(packed.key)
     monkeypatch.setattr("ballpass.runtime.native.compilers.find_compiler", lambda command=None: None)
-    words = f"The worker on {socket.gethostname()}, process {os.getpid()}, needs a C compiler"
-    with pytest.raises(RequestError, match=words):
+    with pytest.raises(RequestError, match=f"{worker}: it needs a C compiler"):
         workshop.model(packed.key)

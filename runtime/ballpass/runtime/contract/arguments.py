@@ -33,6 +33,7 @@ _EXPECTED = {
     "LoadedModel": "a model that `load` gave",
     "Solution": "a solution of a run",
     "Sensor": "a sensor",
+    "bool": "True or False",
     "Progress": "a function that takes the finished fraction, True, False or None",
     "Callable[[str, float], None] | bool": "a function that takes words and the finished fraction, True, False or None",
 }
@@ -79,6 +80,8 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
         return isinstance(value, str | os.PathLike) and value != ""
     if expected == _MAPPING:
         return isinstance(value, Mapping)
+    if kind == "bool":
+        return isinstance(value.item() if getattr(value, "shape", None) == () else value, bool)
     if "True, False or None" in expected:
         return value is None or isinstance(value, bool) or callable(value)
     return any(base.__name__ == kind for base in type(value).__mro__)

@@ -88,9 +88,6 @@ class Option:
             value = math.copysign(math.inf, value > 0 or -1) if abs(value) > sys.float_info.max else value
             right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
             given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
-        elif kind is bool and not isinstance(value, bool):
-            allowed, right = "True, False", False
-            given = f"{value!r:.60} ({type(value).__name__}) is neither"
         elif kind in (float, int, float | None, int | None) and not is_number(value):
             if value is None and kind not in (float, int):
                 return None

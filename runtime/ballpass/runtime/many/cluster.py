@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from ballpass.runtime.contract import read_artefact
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import CompileError, RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
@@ -105,9 +105,14 @@ class _Workshop:
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:
             archive.extractall(place)
-        need_compiler(f"The worker on {socket.gethostname()}, process {os.getpid()},")
         manifest = read_artefact(place)
-        return LoadedModel(place, manifest, compile_model(place, manifest))
+        try:
+            need_compiler("it")
+            library = compile_model(place, manifest)
+        except (RequestError, CompileError) as fault:
+            where = f"The worker on {socket.gethostname()}, process {os.getpid()}"
+            raise type(fault)(f"{where}: {fault}") from fault
+        return LoadedModel(place, manifest, library)
 
 
 _workshop = _Workshop()
