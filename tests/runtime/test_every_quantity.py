@@ -6,16 +6,22 @@ own, a colon and a state are none.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray
+from typer.testing import CliRunner
 
-from ballpass.runtime import Model, QuantityFunction, RequestError
+from ballpass.runtime import Model, QuantityFunction, RequestError, SignalClass, Signals, make_data_set
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.certify.simplification import measure_simplification
-from ballpass.runtime.certify.trade import measure_trade
+from ballpass.runtime.certify.trade import REFERENCE, measure_trade
 from ballpass.runtime.quantity.registry import KINDS
+from ballpass.runtime.run.driver_angle import period
 
 #: How kinds are asked for that take no state, or want a place.
 NAMES = {
@@ -76,6 +82,58 @@ def test_a_run_has_one_value_for_each_to_the_last_bit(press: Model, expected: di
         assert reduced["inner.y"].rms == expected["rms:inner.y"]
         assert solution.x[-1, press.states.index("inner.y")] == expected["end:inner.y"]
     assert press.reduce(**options)["inner.y"].range == expected["range:inner.y"]
+
+
+FEW = ("max:ball.force", "rms:inner.y", "mean:ball.force[3]", "amplitude:inner.y@2x", "drive_work")
+
+
+@pytest.mark.parametrize(
+    ("scene", "names"),
+    [
+        ("punching_press", FEW),
+        *(pytest.param(scene, ALL, marks=pytest.mark.long) for scene in ("punching_press", "punching_press_two_way")),
+    ],
+)
+def test_commands_and_data_sets_give_that_value(
+    make_model: Callable[..., Model], scene: str, names: tuple[str, ...], tmp_path: Path
+) -> None:
+    """`ballpass run`, `ballpass sweep` and a data set: to the last bit at equal options."""
+    model = make_model(scene)
+    here = model.parameters[CLEARANCE]
+    signals = Signals(
+        outputs=("inner.y",), sample_rate=10e3, duration=0.12, transient=0.06, rtol=1e-9, quantities=names
+    )
+    length = {
+        "duration": float(signals.times[-1]),
+        "transient": signals.transient / period(model.manifest, model.numbers().values),
+    }
+    expected = {name: one.value for name, one in model.quantities(names, rtol=1e-9, **length).items()}
+    asked = ["--rtol=1e-9", f"--duration={length['duration']!r} s", f"--transient={length['transient']!r}"]
+    asked += [*(f"--of={name}" for name in names), "--no-figures", "--json", f"--out={tmp_path}"]
+
+    def shown(*words: str) -> Mapping[str, Any]:
+        done = CliRunner().invoke(app, [*words, *asked])
+        assert done.exit_code == 0, done.stderr
+        found: Mapping[str, Any] = json.loads(done.stdout)["quantities"]
+        return found
+
+    run = shown("run", str(model.folder))
+    assert {name: run[name]["value"] for name in names} == expected
+    sweep = shown("sweep", str(model.folder), f"--vary={CLEARANCE}={here!r} m:{2.0 * here!r} m:2")
+    assert {name: sweep[name]["values"][0] for name in names} == expected
+    one = SignalClass(label="one", model=model, members=1, parameters={})
+    make_data_set(tmp_path / "one.nc", [one], signals, seed=1)
+    with xarray.open_dataset(tmp_path / "one.nc") as labels:
+        assert dict(zip(names, labels["quantities"].values[0].tolist(), strict=True)) == expected
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scene", ["punching_press", "punching_press_two_way"])
+def test_the_reference_of_trade_has_that_value(make_model: Callable[..., Model], scene: str) -> None:
+    model = make_model(scene)
+    trade = measure_trade(model, ALL, members=2, spread=0.0, ways=[])
+    alike = model.quantities(ALL, method=REFERENCE.method, rtol=REFERENCE.rtol, kinks=REFERENCE.kinks)
+    assert trade.values == {name: one.value for name, one in alike.items()}
 
 
 def test_lanes_are_a_fast_path_of_the_same_kinds(press: Model) -> None:
