@@ -155,6 +155,8 @@ def test_peak_force_of_the_press_over_ten_parameters_takes_less_than_two_minutes
         ({"of": "rms:inner.y", "vary": f"{CLEARANCE}=norm:loc=1 N"}, CLEARANCE),
         ({"of": "rms:inner.y", "vary": f"{CLEARANCE}=norm:scale=-1 um"}, "domain"),
         ({"of": "rms:inner.y", "vary": [f"{CLEARANCE}=1 um:2 um"] * 2}, "each once"),
+        ({"limit": "rms:inner.y"}, "^limit: 'rms:inner.y' is no limit"),
+        ({"limit": "rms:inner.y <= 5 N"}, "^limit rms:inner.y: "),
     ],
 )
 def test_wrong_requests_are_refused(make_model: Callable[..., Model], options: dict[str, object], words: str) -> None:

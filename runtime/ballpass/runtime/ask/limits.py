@@ -45,25 +45,25 @@ class Limit:
         return self.sign * (self.value - self.limit) / max(abs(self.limit), 1e-300)
 
 
-def read_limits(model: PointModel, texts: Sequence[str]) -> list[Limit]:
-    """Constraints from texts.
+def read_limits(model: PointModel, option: str, texts: Sequence[str]) -> list[Limit]:
+    """Constraints from the texts of an option.
 
     Raises
     ------
     RequestError
         Another form, an unknown quantity, or a wrong unit.
     """
-    return [_read(model, text) for text in texts]
+    return [_read(model, option, text) for text in texts]
 
 
-def _read(model: PointModel, text: str) -> Limit:
+def _read(model: PointModel, option: str, text: str) -> Limit:
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text)
     if match is None:
-        raise RequestError(f'subject_to: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
+        raise RequestError(f'{option}: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
     name, sign, written = match.groups()
     unit = quantities_of(model, [name])[0].unit
     try:
         value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
     except (QuantityError, ValueError) as error:
-        raise RequestError(f"subject_to {name}: {error}") from None
+        raise RequestError(f"{option} {name}: {error}") from None
     return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)

@@ -42,7 +42,7 @@ class WorstValues:
 
     Attributes
     ----------
-    deviations : of all parameters: none, the corners of the box, and points within, shape (points, parameters)
+    decides : what decides the values beside the model, for parts that are kept
     sizes : of goal and limits, SI; known after `candidates`
     """
 
@@ -77,8 +77,8 @@ class WorstValues:
         self._columns = [0, *(names.index(one.quantity) for one in limits)]
         self._signs = np.array([1.0, *(one.sign for one in limits)])
         self._offsets = np.array([0.0, *(one.limit for one in limits)])
-        self.deviations = self._all_deviations()
-        self.decides = (names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self.deviations)
+        self._deviations = self._all_deviations()
+        self.decides = (names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self._deviations)
         self.sizes = np.ones(len(self._columns))
 
     def candidates(self, shares: np.ndarray, parts: KeptParts) -> np.ndarray:
@@ -92,7 +92,7 @@ class WorstValues:
 
     def plane(self, share: np.ndarray, parts: KeptParts) -> Plane:
         """Values and exact slopes at a point."""
-        values, slopes, _ = parts.once(share, lambda: self._exactly(share))
+        values, slopes = parts.once(share, lambda: self._exactly(share))
         size = (self._signs / self.sizes)[:, None]
         return Plane(
             x=share,
@@ -110,7 +110,7 @@ class WorstValues:
 
     def worst_deviations(self, share: np.ndarray) -> tuple[float, ...]:
         """Deviations at which the goal is worst, SI, one for each tolerance."""
-        worst = self.deviations[self._worst(share)[0]]
+        worst = self._deviations[self._worst(share)[0]]
         return tuple(float(worst[self._names.index(one.name)]) for one in self._box)
 
     def without_deviations(self, share: np.ndarray) -> float:
@@ -145,12 +145,12 @@ class WorstValues:
         """Values of all parameters with each deviation, the first with none."""
         x = self._exact.start.copy()
         x[: len(self._vary)] = self.at(share)
-        found: np.ndarray = x + self.deviations
+        found: np.ndarray = x + self._deviations
         return found
 
     def _worst(self, share: np.ndarray) -> np.ndarray:
         """The deviation with the worst value of goal and each limit."""
-        if len(self.deviations) == 1:
+        if len(self._deviations) == 1:
             return np.zeros(len(self._columns), dtype=int)
         found: np.ndarray = np.argmax(self._signs * self._lanes(self._rows(share))[:, self._columns], axis=0)
         return found
@@ -160,9 +160,10 @@ class WorstValues:
         rows, place = np.unique(which, return_inverse=True)
         x = self._rows(share)[rows]
         slopes = self._exact.jacobian(x)[place, self._columns, : len(self._vary)]
-        return self._exact(x)[place, self._columns], slopes, which
+        return self._exact(x)[place, self._columns], slopes
 
     def _all_deviations(self) -> np.ndarray:
+        """Of all parameters: none, the corners of the box, and points within, shape (points, parameters)."""
         none = np.zeros((1, len(self._names)))
         if not self._box:
             return none

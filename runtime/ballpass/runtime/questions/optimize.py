@@ -281,7 +281,7 @@ def optimize(
         raise RequestError(
             f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."
         )
-    limits = read_limits(model, _texts(subject_to))
+    limits = read_limits(model, "subject_to", _texts(subject_to))
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
     shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
     with (

@@ -275,7 +275,7 @@ def sobol(
     from ballpass.runtime.quantity.grammar import quantities_of
 
     inputs = read_inputs(model, vary)
-    limits = read_limits(model, [limit] if isinstance(limit, str) else list(limit or []))
+    limits = read_limits(model, "limit", [limit] if isinstance(limit, str) else list(limit or []))
     names = [of] if isinstance(of, str) else list(of or [])
     names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
     units = [one.unit for one in quantities_of(model, names)]
