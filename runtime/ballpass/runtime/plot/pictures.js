@@ -12,14 +12,20 @@ function use(run) {
   [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
 }
 const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
-const all = ({ values, decimals }) => { const unit = 10 ** decimals; return values.map((value) => value / unit); };
+const all = (signal) => { const unit = 10 ** signal.decimals; return signal.all ??= signal.values.map((value) => value / unit); };
 const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
-const length = ([x, y]) => Math.hypot(x, y);
+const length = ([x, y]) => Math.sqrt(x * x + y * y); // much faster than Math.hypot
 const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
-const short = (value) => Math.round(1e3 * value) / 1e3; // several times as fast as toFixed
+const short = (value) => Math.round(1e2 * value) / 1e2; // several times as fast as toFixed
 const joined = (places) => places.map(([x, y]) => short(x) + "," + short(y)).join(" ");
-const traced = (values, X, Y) => { let text = ""; for (let k = 0; k < values.length; k += 1) text += X(k) + "," + short(Y(values[k])) + " "; return text; };
+// The points of a curve; within a stretch of one height there are none.
+function traced(values, places, Y) {
+  const heights = values.map((value) => short(Y(value)));
+  let text = "";
+  for (let k = 0; k < heights.length; k += 1) if (heights[k] !== heights[k - 1] || heights[k] !== heights[k + 1]) text += places[k] + heights[k] + " ";
+  return text;
+}
 const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
 
 function draw(parent, kind, attributes, text = "", node = document.createElementNS("http://www.w3.org/2000/svg", kind)) {
@@ -72,8 +78,8 @@ function drawLinkage(parts) {
   };
   moves.push(() => { full = []; });
   const unit = 52 / Math.max(parts.high[0] - parts.low[0], parts.high[1] - parts.low[1], 1e-9);
-  const place = (number, k) => pair(parts.points[number], k).map(
-    (value, axis) => (axis ? -unit : unit) * (value - (parts.low[axis] + parts.high[axis]) / 2));
+  const middle = [0, 1].map((axis) => (parts.low[axis] + parts.high[axis]) / 2);
+  const place = (number, k) => { const [x, y] = pair(parts.points[number], k); return [unit * (x - middle[0]), unit * (middle[1] - y)]; };
   parts.points.forEach((_, number) => draw(picture, "polyline", {
     points: joined(frames.map((k) => place(number, k))), fill: "none", stroke: "var(--soft)", "stroke-width": 0.25, "stroke-dasharray": "1 0.8",
   }));
@@ -222,10 +228,10 @@ function drawChart(title, unit, curves) {
   const [width, height, left, right, top, below] = [420, 190, 56, 14, 8, 40], section = element(get("charts"), "section");
   element(section, "h2", `${title} [${unit}]`);
   const picture = draw(section, "svg", { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": title });
-  const values = curves.map((curve) => all(curve.signal)), olds = curves.map((curve) => (curve.before ? all(curve.before) : []));
-  const shown = [...values, ...olds].flat(), [low, high] = [-highest(shown.map((one) => -one)), highest(shown)];
+  const values = curves.map((curve) => all(curve.signal)), olds = curves.filter((curve) => curve.before).map((curve) => all(curve.before));
+  const shown = [...values, ...olds], [low, high] = [-highest(shown.map((some) => highest(some.map((one) => -one)))), highest(shown.map(highest))];
   const X = (x) => left + (x - begin) / (end - begin || 1) * (width - left - right), Y = (y) => top + (high - y) / (high - low) * (height - top - below);
-  const places = across.map((x) => short(X(x)));
+  const places = across.map((x) => short(X(x)) + ",");
   for (const [from, to] of data.windows) {
     for (let turn = Math.floor(begin / 360) - 1; turn * 360 <= end; turn += 1) {
       const [a, b] = [Math.max(from + 360 * turn, begin), Math.min(to + 360 * turn, end)];
@@ -240,12 +246,12 @@ function drawChart(title, unit, curves) {
   for (const x of marks) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
   draw(picture, "text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, data.turning ? `${data.driver} angle [\u00b0]` : "time [ms]");
   olds.forEach((old) => draw(picture, "polyline", {
-    points: traced(old, (k) => short(X(compared.across[k])), Y), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
+    points: traced(old, compared.across.map((x) => short(X(x)) + ","), Y), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
   }));
   curves.forEach(({ colour = "var(--ink)", wide = 1.5, dashes = "none" }, n) => draw(picture, "polyline", {
-    points: traced(values[n], (k) => places[k], Y), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
+    points: traced(values[n], places, Y), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
   }));
-  element(section, "p", [...curves.map((curve) => curve.name), olds.flat().length && "dotted: the scene's numbers", data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
+  element(section, "p", [...curves.map((curve) => curve.name), olds.length && "dotted: the scene's numbers", data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
   const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });
   const follow = (event) => {
     const box = picture.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * width;

@@ -26,10 +26,12 @@ function complaint() {
 }
 const must = (answer) => { if (answer) throw new Error(complaint()); };
 
+let seen = new Float64Array();
 function readRow() {
   must(machine.ballpass_read(machine.one, machine.row));
   machine.ballpass_drawn(machine.one, machine.row + 8 * solver.columns.length);
-  return inMemory(machine.row, width);
+  if (seen.buffer !== machine.memory.buffer) seen = inMemory(machine.row, width); // memory that grows is another one
+  return seen;
 }
 
 // A run of these numbers, or null where `stale` says that it is not wanted any more: its steady samples, row after row.
@@ -208,7 +210,7 @@ function loadOf(run, load, row) {
   return load.columns.map((column) => share * row[column]);
 }
 
-const motionOf = (bearing, row) => bearing.inner.map((column, axis) => 1e6 * (row[column] - (bearing.outer ? row[bearing.outer[axis]] : 0)));
+const motionOf = ({ inner, outer }, row) => (outer ? [1e6 * (row[inner[0]] - row[outer[0]]), 1e6 * (row[inner[1]] - row[outer[1]])] : [1e6 * row[inner[0]], 1e6 * row[inner[1]]]);
 
 // ------------------------------------------------------------------------------------------------------------- limits
 // A number as Python's format "g" writes it, and a template of `str.format` filled with such numbers.
