@@ -69,6 +69,7 @@ def generate(
     *,
     force: bool = False,
     progress: Callable[[str], None] | None = None,
+    inspect: Callable[[mf.Manifest], None] | None = None,
 ) -> Path:
     """Write the generated folder of a scene unless it is there and fresh.
 
@@ -78,6 +79,7 @@ def generate(
     out : folder to write; ``./generated/<scene name>`` by default
     force : derive again even where nothing changed
     progress : called with the name of each stage
+    inspect : called with the model's manifest before C is generated; nothing is written where it raises
 
     Returns
     -------
@@ -97,19 +99,26 @@ def generate(
     'drive_torque'
     """
     say = progress or (lambda _: None)
-    if not force and fresh_manifest(scene, out) is not None:
+    look = inspect or (lambda _: None)
+    fresh = None if force else fresh_manifest(scene, out)
+    if fresh is not None:
+        look(fresh)
         return folder_of(scene, out)
     read, source = _read(scene)
     folder = folder_of(scene, out)
     present = None if force else intact_manifest(folder)
     if present is not None and present.signature == signature(read):
+        look(present)
         _refresh(folder, present, read, source)
         return folder
     _refuse_foreign(folder)
     with shown("deriving equations, writing C"):
         system, functions = _derive_and_lower(read, say)
-        say("emit")
+        from ballpass.derive.emit.describe import describe
         from ballpass.derive.emit.folder import write_folder
+
+        look(describe(system, functions, source, ()))
+        say("emit")
 
         replace_files(
             folder,

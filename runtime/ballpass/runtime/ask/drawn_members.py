@@ -13,6 +13,7 @@ import numpy as np
 
 from ballpass.runtime.ask.kept_parts import Arrays, kept_parts
 from ballpass.runtime.ask.parameter_distribution import parameter_distribution
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.many.distributions import Distribution
 from ballpass.runtime.many.ensemble import simulate_many
@@ -22,8 +23,12 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 MOST, BLOCK = 10_000_000, 1024
 
 
-def read_inputs(model: LoadedModel, vary: str | Sequence[str]) -> dict[str, Distribution]:
+def read_inputs(manifest: Manifest, option: str, vary: str | Sequence[str]) -> dict[str, Distribution]:
     """Distributions of the inputs by name.
+
+    Parameters
+    ----------
+    option : what the caller calls them, for messages
 
     Raises
     ------
@@ -31,10 +36,12 @@ def read_inputs(model: LoadedModel, vary: str | Sequence[str]) -> dict[str, Dist
         None, or one twice; or see `parameter_distribution`.
     """
     texts = [vary] if isinstance(vary, str) else list(vary)
-    pairs = [parameter_distribution(model.manifest, "vary", text) for text in texts]
+    pairs = [parameter_distribution(manifest, option, text) for text in texts]
     found = dict(pairs)
     if not found or len(found) < len(pairs):
-        raise RequestError(f"vary: one parameter or more is expected, each once, not {[name for name, _ in pairs]!r}.")
+        raise RequestError(
+            f"{option}: one parameter or more is expected, each once, not {[name for name, _ in pairs]!r}."
+        )
     return found
 
 

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
-from ballpass.runtime.point.point_model import PointModel
-from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class Limit:
         return self.sign * (self.value - self.limit) / max(abs(self.limit), 1e-300)
 
 
-def read_limits(model: PointModel, option: str, texts: Sequence[str]) -> list[Limit]:
+def read_limits(manifest: Manifest, option: str, texts: Sequence[str]) -> list[Limit]:
     """Constraints from the texts of an option.
 
     Raises
@@ -53,15 +53,21 @@ def read_limits(model: PointModel, option: str, texts: Sequence[str]) -> list[Li
     RequestError
         Another form, an unknown quantity, or a wrong unit.
     """
-    return [_read(model, option, text) for text in texts]
+    return [_read(manifest, option, text) for text in texts]
 
 
-def _read(model: PointModel, option: str, text: str) -> Limit:
+def limited(option: str, text: str) -> tuple[str, str, str]:
+    """Quantity, sign and value of a limit, as written; RequestError for another form."""
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text)
     if match is None:
         raise RequestError(f'{option}: {text!r:.80} is no limit. Allowed: "Q <= VALUE" or "Q >= VALUE".')
     name, sign, written = match.groups()
-    unit = quantities_of(model, [name])[0].unit
+    return name, sign, written
+
+
+def _read(manifest: Manifest, option: str, text: str) -> Limit:
+    name, sign, written = limited(option, text)
+    unit = parse_quantity_name(manifest, name).unit
     try:
         value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
     except (QuantityError, ValueError) as error:

@@ -12,14 +12,14 @@ variable ``time`` or ``frequency``, units in attributes, and numbers of the tria
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.parameters import unknown_name
@@ -163,6 +163,15 @@ def _with_unit(what: str, text: str, unit: str) -> float:
         return _quantity(what, text, unit)
 
 
+def measurable(manifest: Manifest, wanted: Iterable[str]) -> dict[str, VariableInfo]:
+    """States and outputs with one value; `RequestError` for what is wanted and none of them."""
+    infos = {info.name: info for info in (*manifest.states, *manifest.outputs) if getattr(info, "size", 1) == 1}
+    faults = [unknown_name("output or state with one value", key, infos) for key in wanted if key not in infos]
+    if faults:
+        raise RequestError("\n".join(faults))
+    return infos
+
+
 def _trial(
     manifest: Manifest,
     name: str,
@@ -170,10 +179,9 @@ def _trial(
     columns: Mapping[str, str],
     numbers: Mapping[str, float],
 ) -> Trial:
-    infos = {info.name: info for info in (*manifest.states, *manifest.outputs) if getattr(info, "size", 1) == 1}
+    infos = measurable(manifest, columns)
     chosen = dict(columns) or {key: key for key in table if key in infos}
-    faults = [unknown_name("output or state with one value", key, infos) for key in chosen if key not in infos]
-    faults += [unknown_name(f"column of {name}", column, table) for column in chosen.values() if column not in table]
+    faults = [unknown_name(f"column of {name}", column, table) for column in chosen.values() if column not in table]
     axis, unit = ("frequency", "Hz") if "frequency" in table else ("time", "s")
     if axis not in table:
         faults.append(f"{name} has no time. Allowed: a variable `time` or `frequency`; the first column of a CSV file.")

@@ -10,9 +10,8 @@ run with a looser tolerance gives their uncertainty.  The certificate compares e
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import partial
 
 import numpy as np
@@ -37,7 +36,7 @@ from ballpass.runtime.certify.sensitivity_report import (
 )
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
@@ -165,7 +164,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     refuse_jumps(manifest, "sensitivity")
     check_assembly(model, numbers)
     quantities = quantities_of(model, _listed("of", query.of, default_quantities(manifest)))
-    names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
+    names = parameters_named(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
     request = replace(query.request, method=query.method, rtol=query.rtol, kinks=query.kinks)
     run, fine = derivative_run(model, numbers, request)
     tell = query.progress or (lambda _words, _fraction: None)
@@ -263,17 +262,6 @@ def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) ->
     if not names:
         raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
     return names
-
-
-def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
-    """Parameters by name or shell-style pattern, each once; those of a pattern in the scene's order."""
-    found: list[str] = []
-    for pattern in patterns:
-        matches = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
-        if not matches:
-            raise RequestError(unknown_name("parameter", pattern, known))
-        found += matches
-    return list(dict.fromkeys(found))
 
 
 def _difference_scales(run: Run, names: Sequence[str]) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
@@ -17,6 +17,7 @@ from typing import Annotated, Any, get_args, get_origin
 from ballpass.runtime.contract.arguments import is_number, type_fault
 from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 
 #: What a number with a unit is.
 _KINDS = {"s": "time", "Hz": "frequency", "rad": "angle"}
@@ -36,6 +37,8 @@ class Option:
     least, above, most : bounds of a number
     choices : allowed words; empty for any
     reader : of a record, which the command line takes as text
+    names : where its texts name something of a model: raises `RequestError` for what the manifest does not have, and
+        without a manifest for what no scene has; called with the manifest or None, the parameter's name, the texts
     behind_scene : whether it stands behind the scene on the command line, without a flag
     """
 
@@ -49,6 +52,7 @@ class Option:
     most: float = math.inf
     choices: tuple[str, ...] = ()
     reader: Callable[[str], Any] | None = None
+    names: Callable[[Manifest | None, str, Sequence[str]], object] | None = None
     behind_scene: bool = False
 
     def flag(self, name: str) -> str:
@@ -137,6 +141,32 @@ def refuse_faults(options: Mapping[str, tuple[Any, Option]], values: Mapping[str
     found = [option.fault(name, kind, values[name]) for name, (kind, option) in options.items() if name in values]
     if any(found):
         raise RequestError("\n".join(filter(None, found)))
+
+
+def refuse_unknown(
+    options: Mapping[str, tuple[Any, Option]], values: Mapping[str, Any], manifest: Manifest | None = None
+) -> None:
+    """Refuse names that no scene has, all at once; with a manifest those that its model does not have.
+
+    Parameters
+    ----------
+    options : with their types, by the names of the parameters, as are the values
+
+    Raises
+    ------
+    RequestError
+        Unknown names, with the nearest known ones.
+    """
+    faults = []
+    for name, (_, option) in options.items():
+        value = values.get(name)
+        if option.names is not None and value is not None:
+            try:
+                option.names(manifest, name, [value] if isinstance(value, str) else list(value))
+            except RequestError as fault:
+                faults.append(str(fault))
+    if faults:
+        raise RequestError("\n".join(faults))
 
 
 def is_of(kind: Any, container: type) -> bool:

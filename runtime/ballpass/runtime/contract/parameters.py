@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from numbers import Real
 
 import numpy as np
@@ -130,6 +131,18 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
     if faults:
         raise RequestError("\n".join(faults))
     return Parameters(manifest.parameters, values)
+
+
+def parameters_named(patterns: Sequence[str], known: Iterable[str]) -> list[str]:
+    """Parameters by name or shell-style pattern, each once; those of a pattern in the order of `known`."""
+    names = list(known)
+    found: list[str] = []
+    for pattern in patterns:
+        matches = [pattern] if pattern in names else [name for name in names if fnmatchcase(name, pattern)]
+        if not matches:
+            raise RequestError(unknown_name("parameter", pattern, names))
+        found += matches
+    return list(dict.fromkeys(found))
 
 
 def numbers_of(

@@ -235,7 +235,7 @@ def _check(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: i
     if faults:
         raise RequestError("\n".join(faults))
     for one in classes:
-        check_outputs(one.model, signals, one.label)
+        check_outputs(one.model.manifest, signals, one.label, one.model)
 
 
 def _check_room(target: Path, classes: Sequence[SignalClass], signals: Signals) -> None:

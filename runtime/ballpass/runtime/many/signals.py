@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.parameters import Numbers
@@ -20,7 +21,7 @@ from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.distributions import NOISE, Distribution, stream
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
@@ -54,7 +55,7 @@ class Signals:
     Raises
     ------
     RequestError
-        A number out of range; all faults at once.
+        A number out of range, all faults at once; or a kind of quantity that there is not.
 
     Examples
     --------
@@ -92,6 +93,7 @@ class Signals:
             )
         if faults:
             raise RequestError("\n".join(faults))
+        refuse_unknown_kinds(self.quantities)
 
     @property
     def samples(self) -> int:
@@ -206,8 +208,12 @@ def _quantities(model: LoadedModel, numbers: Numbers, signals: Signals) -> np.nd
     return QuantityRun(model, quantities_of(model, signals.quantities)).measure(run).values
 
 
-def check_outputs(model: LoadedModel, signals: Signals, label: str) -> None:
+def check_outputs(manifest: Manifest, signals: Signals, label: str, model: LoadedModel | None = None) -> None:
     """Refuse outputs that the model of a class does not have, or that have a value for each ball; and quantities.
+
+    Parameters
+    ----------
+    model : where it is loaded: then also quantities that have no value with its numbers
 
     Raises
     ------
@@ -216,20 +222,22 @@ def check_outputs(model: LoadedModel, signals: Signals, label: str) -> None:
     """
     from ballpass.runtime.run.request import no_output
 
-    infos = {info.name: info for info in model.manifest.outputs}
+    infos = {info.name: info for info in manifest.outputs}
     faults = []
     for name in signals.outputs:
         if name not in infos:
-            faults.append(f"class {label}: {no_output(model.manifest, name, tuple(infos), 'output')}")
+            faults.append(f"class {label}: {no_output(manifest, name, tuple(infos), 'output')}")
         elif infos[name].size != 1:
             faults.append(
                 f"class {label}: {name} has a value for each ball, and a signal has one. Allowed: outputs with one "
                 "value, such as inner.ax or reaction.A.x."
             )
-    if signals.quantities:
-        try:
+    try:
+        if model is None:
+            parse_quantities(manifest, signals.quantities)
+        elif signals.quantities:
             quantities_of(model, signals.quantities)
-        except RequestError as fault:
-            faults += [f"class {label}: {line}" for line in str(fault).splitlines()]
+    except RequestError as fault:
+        faults += [f"class {label}: {line}" for line in str(fault).splitlines()]
     if faults:
         raise RequestError("\n".join(faults))

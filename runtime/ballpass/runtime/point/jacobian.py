@@ -21,6 +21,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -72,6 +73,22 @@ class JacobianDirections:
         return {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": self.c}[argument]
 
 
+def differentiable(manifest: Manifest, names: Sequence[str]) -> list[str]:
+    """What can be differentiated; `RequestError` where none of it has one of the names or patterns, all at once."""
+    known = [RHS] if any(info.name == RHS for info in manifest.functions) else []
+    known += [item.name for item in manifest.quantities]
+    faults = [
+        on_request(name) or unknown_name("function to differentiate", name, known)
+        for name in names
+        if not any(fnmatchcase(candidate, name) for candidate in known)
+    ]
+    if not names:
+        faults.append("Nothing to differentiate was named. Give a name, as ball.force, or several.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    return known
+
+
 def rows_of(model: LoadedModel, of: str | Sequence[str]) -> list[Rows]:
     """Rows of the right-hand side ("rhs") or of quantities by name or pattern, one record per generated function.
 
@@ -82,16 +99,7 @@ def rows_of(model: LoadedModel, of: str | Sequence[str]) -> list[Rows]:
     """
     names = [of] if isinstance(of, str) else list(of)
     manifest = model.manifest
-    known = [*((RHS,) if model.has(RHS) else ()), *(item.name for item in manifest.quantities)]
-    faults = [
-        on_request(name) or unknown_name("function to differentiate", name, known)
-        for name in names
-        if not any(fnmatchcase(candidate, name) for candidate in known)
-    ]
-    if not names:
-        faults.append("Nothing to differentiate was named. Give a name, as ball.force, or several.")
-    if faults:
-        raise RequestError("\n".join(faults))
+    known = differentiable(manifest, names)
     chosen = [c for name in names for c in known if fnmatchcase(c, name) and (c != RHS or name == RHS)]
     place: dict[str, tuple[str, int, int, str]] = {}
     counts: dict[str, int] = {}
@@ -128,6 +136,22 @@ def _merged(found: Sequence[Rows]) -> list[Rows]:
     return out
 
 
+def check_directions(manifest: Manifest, names: Sequence[str]) -> dict[str, str]:
+    """Units of all that can be differentiated by; `RequestError` for other names, all at once."""
+    units = {state.name: state.unit for state in manifest.states} | {TIME: "s", CRANK_ANGLE: "rad"}
+    units |= {info.name: info.unit for info in manifest.parameters}
+    known = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.states)]
+    words = f"'{STATES}', names of states, '{TIME}' and '{CRANK_ANGLE}'"
+    faults = [
+        f"{unknown_name('parameter', name, (*known, STATES, TIME, CRANK_ANGLE))} Besides parameters, wrt takes {words}."
+        for name in names
+        if name not in (*units, STATES)
+    ]
+    if faults:
+        raise RequestError("\n".join(faults))
+    return units
+
+
 def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str], t: float) -> JacobianDirections:
     """Directions along states ("states": all), "time", "crank_angle" or parameters, at time `t` [s].
 
@@ -140,20 +164,13 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
     names = [wrt] if isinstance(wrt, str) else list(wrt)
     names = [item for name in names for item in (model.states if name == STATES else (name,))]
     rows = {name: row for row, name in enumerate(numbers.parameters)}
-    units = {state.name: state.unit for state in manifest.states} | {TIME: "s", CRANK_ANGLE: "rad"}
-    units |= {info.name: info.unit for info in manifest.parameters}
-    faults = []
-    for name in names:
-        if name not in units:
-            words = f"'{STATES}', names of states, '{TIME}' and '{CRANK_ANGLE}'"
-            hint = unknown_name("parameter", name, (*rows, *model.states, STATES, TIME, CRANK_ANGLE))
-            faults.append(f"{hint} Besides parameters, wrt takes {words}.")
+    units = check_directions(manifest, names)
     if not names and not model.states and wrt == STATES:
-        faults.append("wrt: this model has no states: a scene with [bearing] has. Give parameters, or 'crank_angle'.")
-    elif not names:
-        faults.append("wrt: nothing to differentiate by was named. Give a parameter, or 'states'.")
-    if faults:
-        raise RequestError("\n".join(faults))
+        raise RequestError(
+            "wrt: this model has no states: a scene with [bearing] has. Give parameters, or 'crank_angle'."
+        )
+    if not names:
+        raise RequestError("wrt: nothing to differentiate by was named. Give a parameter, or 'states'.")
     count = len(names)
     along_t, along_x = np.zeros((1, count)), np.zeros((len(model.states), count))
     along_p = np.zeros((len(numbers.p), count))

@@ -14,7 +14,8 @@ colon and points, ``peak_ball_force`` and ``rms_inner_y``.  What each kind does 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TypeVar
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
@@ -24,6 +25,9 @@ from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import ALSO, KINDS
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import no_output
+
+_Given = TypeVar("_Given")
+_Found = TypeVar("_Found")
 
 #: Default quantities of each bearing.
 DEFAULTS = (
@@ -40,24 +44,50 @@ def quantities_of(model: LoadedModel, names: Sequence[str]) -> tuple[Quantity, .
     Raises
     ------
     RequestError
-        Unknown names; or what has no value with the scene's numbers.  All faults at once.
+        As `parse_quantities`; then what has no value with the scene's numbers.  All faults at once.
     """
+    found = parse_quantities(model.manifest, names)
     values = model.numbers(None).values
+
+    def check(quantity: Quantity) -> None:
+        one = KINDS[quantity.kind].check
+        if one is not None:
+            one(model.manifest, values, quantity)
+
+    _all_at_once(check, found)
+    if not found:
+        raise RequestError("of: at least one quantity is expected. Example: peak_ball_force.")
+    return found
+
+
+def parse_quantities(manifest: Manifest, names: Sequence[str]) -> tuple[Quantity, ...]:
+    """Read names of quantities, each once.
+
+    Raises
+    ------
+    RequestError
+        As `refuse_unknown_kinds`; then what the manifest does not have.  All faults at once.
+    """
+    refuse_unknown_kinds(names)
+    return tuple(_all_at_once(lambda name: parse_quantity(manifest, name), dict.fromkeys(names)))
+
+
+def refuse_unknown_kinds(names: Iterable[str]) -> None:
+    """Refuse kinds of quantities that no scene has, all at once: known before a scene is derived."""
+    _all_at_once(_kind_of, dict.fromkeys(names))
+
+
+def _all_at_once(read: Callable[[_Given], _Found], given: Iterable[_Given]) -> list[_Found]:
+    """What is read from each; the messages of all that cannot be read in one `RequestError`."""
     found, faults = [], []
-    for name in dict.fromkeys(names):
+    for one in given:
         try:
-            quantity = parse_quantity(model.manifest, name)
-            check = KINDS[quantity.kind].check
-            if check is not None:
-                check(model.manifest, values, quantity)
-            found.append(quantity)
+            found.append(read(one))
         except RequestError as fault:
             faults.append(str(fault))
     if faults:
         raise RequestError("\n".join(faults))
-    if not found:
-        raise RequestError("of: at least one quantity is expected. Example: peak_ball_force.")
-    return tuple(found)
+    return found
 
 
 def parse_quantity(manifest: Manifest, text: str) -> Quantity:
@@ -81,10 +111,8 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
         _explain_alone(manifest, channels, text, whole)
         known = _usable(manifest, channels)
         raise RequestError(f"{unknown_name('quantity', text, known)} Its form is kind:output, as in max:ball.force.")
-    found = KINDS.get(ALSO.get(form["kind"], form["kind"]))
-    if found is None or found.takes in ("nothing", "bearing at rest"):
-        allowed = [name for name, kind in KINDS.items() if kind.takes in ("channel", "bearing")]
-        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*allowed, *ALSO])}")
+    found = _kind_of(text)
+    assert found is not None  # a form has a kind
     if found.takes == "bearing":
         words = " or ".join(name for name, (kind, _) in names.items() if kind is found and ":" not in name)
         raise RequestError(f"{text}: {found.name} is of a bearing. Write {words or 'it for a scene with one'}.")
@@ -99,6 +127,18 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     _check_place(manifest, text, found, place)
     unit = found.unit or (found.unit_of(unit) if found.unit_of else unit)
     return Quantity(name=text, kind=found.name, channel=form["channel"], ball=ball, place=place, unit=unit)
+
+
+def _kind_of(text: str) -> Kind | None:
+    """The kind in front of a colon; None for a name without one, which is a scene's own."""
+    form = _FORM.fullmatch(str(text))
+    if form is None:
+        return None
+    found = KINDS.get(ALSO.get(form["kind"], form["kind"]))
+    if found is None or found.takes in ("nothing", "bearing at rest"):
+        allowed = [name for name, kind in KINDS.items() if kind.takes in ("channel", "bearing")]
+        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*allowed, *ALSO])}")
+    return found
 
 
 def channels_of(manifest: Manifest) -> dict[str, tuple[int, str]]:

@@ -14,7 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -38,10 +38,20 @@ MOMENTS = 40
 
 Vary = Annotated[
     str,
-    Option(words="Parameter and its values.", shown="PATH=A:B:N", example='bearing.clearance="5 um:40 um:80"'),
+    Option(
+        words="Parameter and its values.",
+        shown="PATH=A:B:N",
+        example='bearing.clearance="5 um:40 um:80"',
+        names=option_names.ranges(counted=True),
+    ),
 ]
 State = Annotated[
-    str | None, Option(words="State that is shown; the inner ring along y if none is given.", shown="STATE")
+    str | None,
+    Option(
+        words="State that is shown; the inner ring along y if none is given.",
+        shown="STATE",
+        names=option_names.states,
+    ),
 ]
 Readings = Annotated[
     int, Option(words="Stroboscopic readings that are kept at each value.", shown="N", least=20, most=100_000)
@@ -213,8 +223,6 @@ def bifurcation(
     chosen = parameter_range(manifest, "vary", vary, counted=True)
     names = [info.name for info in manifest.states]
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    if state not in names:
-        raise RequestError(unknown_name("state", state, names))
     values = np.linspace(chosen.low, chosen.high, chosen.count)
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})

@@ -14,6 +14,7 @@ from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity, table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -54,6 +55,7 @@ Vary = Annotated[
         words="Parameter to find and its bounds; `:log` behind them for equal factors. May be repeated.",
         shown="PATH=A:B",
         example='bearing.clearance="5 um:30 um"',
+        names=option_names.ranges(),
     ),
 ]
 Signals = Annotated[
@@ -62,6 +64,7 @@ Signals = Annotated[
         words="Output that a column holds; else columns are named as outputs. May be repeated.",
         shown="OUTPUT=COLUMN",
         example="outer.y=probe_2",
+        names=option_names.measured,
     ),
 ]
 Begin = Annotated[

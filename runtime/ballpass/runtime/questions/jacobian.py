@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Check, CrankAngle, Instant, Option
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.report.report import Report, ReportTable
 
@@ -18,12 +18,16 @@ Of = Annotated[
     str | Sequence[str],
     Option(
         words="What to differentiate: `rhs`, a quantity (also one that `run.outputs` does not name), a pattern as "
-        '`"reaction.A.*"`. May be repeated.'
+        '`"reaction.A.*"`. May be repeated.',
+        names=option_names.functions,
     ),
 ]
 Wrt = Annotated[
     str | Sequence[str],
-    Option(words="By what: `states`, a state, `time`, `crank_angle`, a number of the scene. May be repeated."),
+    Option(
+        words="By what: `states`, a state, `time`, `crank_angle`, a number of the scene. May be repeated.",
+        names=option_names.directions,
+    ),
 ]
 State = Annotated[
     str,
@@ -106,18 +110,9 @@ def checked_jacobian(
     """
     from ballpass.runtime.certify.jacobian_check import checked_jacobian
     from ballpass.runtime.point.equilibrium import instant, static_equilibrium
-    from ballpass.runtime.point.jacobian import directions_of, rows_of
     from ballpass.runtime.point.run_start import run_numbers
 
     numbers = run_numbers(model, parameters)
     time = instant(model, numbers, t, crank_angle)
-    faults = []
-    for look in (lambda: rows_of(model, of), lambda: directions_of(model, numbers, wrt, time)):
-        try:
-            look()
-        except RequestError as error:
-            faults.append(str(error))
-    if faults:
-        raise RequestError("\n".join(faults))
     x = static_equilibrium(model, numbers, t=time).x if model.states and state == "equilibrium" else None
     return checked_jacobian(model, numbers, of, wrt, t=time, x=x, check=check)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.questions.sobol import Seed, Spread
 from ballpass.runtime.report.report import Report, ReportTable
@@ -23,7 +24,10 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.elementary_effects import ElementaryEffect
 
-Of = Annotated[str | Sequence[str], Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q")]
+Of = Annotated[
+    str | Sequence[str],
+    Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q", names=option_names.quantities),
+]
 Base = Annotated[
     int, Option(words="Base members N; there are N (inputs + 1) members.", shown="N", least=4, most=100_000)
 ]
@@ -170,7 +174,7 @@ def morris(
     from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
     from ballpass.runtime.quantity.grammar import quantities_of
 
-    inputs = read_inputs(model, vary)
+    inputs = read_inputs(model.manifest, "vary", vary)
     names = list(dict.fromkeys([of] if isinstance(of, str) else of))
     units = [one.unit for one in quantities_of(model, names)]
     count = len(inputs)

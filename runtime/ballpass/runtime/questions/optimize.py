@@ -14,6 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -38,18 +39,26 @@ WORSE = 1e-3
 #: A constraint, or a bound, is active within this share of its limit, or of the range [1].
 ACTIVE = 1e-5
 
-Goal = Annotated[str, Option(words="Quantity to make least, as `peak_ball_force`.", shown="Q")]
+Goal = Annotated[
+    str, Option(words="Quantity to make least, as `peak_ball_force`.", shown="Q", names=option_names.quantities)
+]
 Vary = Annotated[
     str | Sequence[str],
     Option(
         words="Parameter and its bounds; `:log` behind them for equal factors. May be repeated.",
         shown="PATH=A:B",
         example='bearing.clearance="0 um:40 um"',
+        names=option_names.ranges(),
     ),
 ]
 Limits = Annotated[
     str | Sequence[str] | None,
-    Option(words="Limit of another quantity. May be repeated.", shown='"Q <= VALUE"', example='"rms:inner.y <= 5 um"'),
+    Option(
+        words="Limit of another quantity. May be repeated.",
+        shown='"Q <= VALUE"',
+        example='"rms:inner.y <= 5 um"',
+        names=option_names.limits,
+    ),
 ]
 Tolerance = Annotated[
     str | Sequence[str] | None,
@@ -58,6 +67,7 @@ Tolerance = Annotated[
         "repeated.",
         shown="PATH=A:B",
         example='bearing.clearance="-2 um:2 um"',
+        names=option_names.ranges(deviations=True),
     ),
 ]
 Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
@@ -281,7 +291,7 @@ def optimize(
         raise RequestError(
             f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."
         )
-    limits = read_limits(model, "subject_to", _texts(subject_to))
+    limits = read_limits(model.manifest, "subject_to", _texts(subject_to))
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
     shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
     with (

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.options import options_of, refuse_faults
+from ballpass.runtime.contract.options import options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.report.report import Report
 
 if TYPE_CHECKING:
@@ -76,6 +76,7 @@ class Question:
             values.apply_defaults()
             refuse_faults(options_of(ask), values.arguments)
             self.refuse(values.arguments)
+            refuse_unknown(options_of(ask), values.arguments, next(iter(values.arguments.values())).manifest)
             return call(*given, **named)
 
         checked.__doc__ = _with_options(ask)

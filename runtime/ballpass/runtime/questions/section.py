@@ -16,7 +16,6 @@ import numpy as np
 from ballpass.runtime.contract.defaults import SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
-from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -214,8 +213,6 @@ def section(
         raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    if state not in names:
-        raise RequestError(unknown_name("state", state, names))
     angle = 0.0 if at is None else at
     times = turn * (settling + angle / 360.0 + np.arange(1, readings + 1))
     with shown("taking points", progress):

@@ -15,6 +15,7 @@ from ballpass.runtime.contract.options import (
     TightRtol,
     Transient,
 )
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.show.progress import shown_steps
 
@@ -30,6 +31,7 @@ Of = Annotated[
         words="Quantity: `max:ball.force` (or `peak_ball_force`), `rms:inner.y`, `value:inner.y@240deg`, `drive_work` "
         "… May be repeated. Peak ball force and motion of the rings if none is given.",
         shown="Q",
+        names=option_names.quantities,
     ),
 ]
 Wrt = Annotated[
@@ -38,6 +40,7 @@ Wrt = Annotated[
         words='Parameter by its path in the scene, or a pattern, as `"bearing.*"`. May be repeated. All if none is '
         "given.",
         shown="P",
+        names=option_names.parameters,
     ),
 ]
 Method = Annotated[str, Option(words="Of the derivatives: `auto`, or a stepper's name.", shown="NAME")]

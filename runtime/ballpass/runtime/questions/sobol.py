@@ -13,6 +13,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.optimize import Limits
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -28,7 +29,10 @@ if TYPE_CHECKING:
 #: Quantiles in the report.
 QUANTILES = (0.05, 0.5, 0.95)
 
-Of = Annotated[str | Sequence[str] | None, Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q")]
+Of = Annotated[
+    str | Sequence[str] | None,
+    Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q", names=option_names.quantities),
+]
 Spread = Annotated[
     str | Sequence[str],
     Option(
@@ -36,6 +40,7 @@ Spread = Annotated[
         "May be repeated.",
         shown="PATH=DISTRIBUTION",
         example='bearing.clearance="norm:loc=10 um:scale=1 um"',
+        names=option_names.distributions,
     ),
 ]
 Samples = Annotated[
@@ -274,8 +279,8 @@ def sobol(
     from ballpass.runtime.ask.variance_shares import variance_shares, wilson
     from ballpass.runtime.quantity.grammar import quantities_of
 
-    inputs = read_inputs(model, vary)
-    limits = read_limits(model, "limit", [limit] if isinstance(limit, str) else list(limit or []))
+    inputs = read_inputs(model.manifest, "vary", vary)
+    limits = read_limits(model.manifest, "limit", [limit] if isinstance(limit, str) else list(limit or []))
     names = [of] if isinstance(of, str) else list(of or [])
     names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
     units = [one.unit for one in quantities_of(model, names)]

@@ -13,6 +13,7 @@ from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -50,7 +51,12 @@ SampleRate = Annotated[
         unit="Hz",
     ),
 ]
-Of = Annotated[str, Option(words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT")]
+Of = Annotated[
+    str,
+    Option(
+        words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT", names=option_names.signals
+    ),
+]
 Band = Annotated[
     tuple[float, float] | None,
     Option(words="The envelope of this band instead of the signal.", example="2kHz:8kHz", shown="LOW:HIGH", unit="Hz"),

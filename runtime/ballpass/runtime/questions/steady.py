@@ -13,6 +13,7 @@ from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -68,6 +69,7 @@ Over = Annotated[
         words="Follow the state over a parameter, from the first end of the range to the second.",
         shown="PATH=A:B",
         example='bearing.clearance="5 um:15 um"',
+        names=option_names.ranges(),
     ),
 ]
 

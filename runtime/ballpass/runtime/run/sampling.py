@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -55,7 +56,7 @@ def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
     RequestError
         The request is wrong; the message says what is allowed.
     """
-    outputs = output_names(model, request.outputs)
+    outputs = output_names(model.manifest, request.outputs)
     duration, times = _sample_times(model, request, turn, outputs)
     even = request.times is None and request.sample_rate is None
     return Sampling(duration=duration, times=times, even=even, outputs=outputs)
@@ -151,7 +152,7 @@ def _check_memory(model: LoadedModel, count: float, outputs: Sequence[str]) -> N
     )
 
 
-def output_names(model: LoadedModel, asked: Sequence[str] | None) -> tuple[str, ...]:
+def output_names(manifest: Manifest, asked: Sequence[str] | None) -> tuple[str, ...]:
     """Names of outputs, each once; None: all of the scene.
 
     Raises
@@ -159,10 +160,11 @@ def output_names(model: LoadedModel, asked: Sequence[str] | None) -> tuple[str, 
     RequestError
         There is no such output.
     """
+    known = tuple(info.name for info in manifest.outputs)
     if asked is None:
-        return model.outputs
+        return known
     names = (asked,) if isinstance(asked, str) else tuple(dict.fromkeys(asked))
-    faults = [no_output(model.manifest, name, model.outputs) for name in names if name not in model.outputs]
+    faults = [no_output(manifest, name, known) for name in names if name not in known]
     if faults:
         raise RequestError("\n".join(faults))
     return names

@@ -5,6 +5,7 @@ In: a scene.  Out: an HTML page that needs nothing else, an MP4 or a GIF.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -13,8 +14,18 @@ from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
 from ballpass.runtime.plot import MOVING
+from ballpass.runtime.questions import option_names
+
+Shown = Annotated[
+    str | None,
+    Option(
+        words="Of several bearings the one that a movie shows; a page opens with it.",
+        shown="NAME",
+        names=option_names.bearings,
+    ),
+]
 
 
 def animate(
@@ -29,10 +40,7 @@ def animate(
         ),
     ] = "html",
     last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
-    bearing: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Of several bearings the one that a movie shows; a page opens with it."),
-    ] = None,
+    bearing: Shown = None,
     pictures: Annotated[
         int | None, typer.Option(metavar="N", help="Pictures of a movie; 72 a turn if not given.")
     ] = None,
@@ -62,11 +70,8 @@ def animate(
             count_pictures(f".{format_}", last, pictures)  # impossible requests: refused before the simulation
         asked = read_asked(scene, set_, duration, transient)
         path = results_file(out, scene, f"animation.{format_}", MOVING)
-        model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
-        if bearing is not None:
-            from ballpass.runtime.plot.record import bearing_named
-
-            bearing_named(model.manifest, bearing)
+        unknown = partial(refuse_unknown, options_in({"bearing": Shown}), {"bearing": bearing})
+        model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides, inspect=unknown)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,

@@ -5,6 +5,7 @@ In: a specification (see `data_set_spec`).  Out: a data set in Zarr or NetCDF.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from ballpass.runtime.app.commands.shared import Stages, check_folder, command, 
 if TYPE_CHECKING:
     from ballpass.runtime.app.commands.data_set_spec import ClassSpec
     from ballpass.runtime.many.data_set import SignalClass
+    from ballpass.runtime.many.signals import Signals
 
 #: Failures that the terminal names; all are in the data set.
 NAMED = 5
@@ -57,7 +59,7 @@ def dataset(
         check_folder(path.parent)
         path.parent.mkdir(parents=True, exist_ok=True)
         with connected(scheduler, workers) as client:
-            classes = [_signal_class(one, stages) for one in read.classes]
+            classes = [_signal_class(one, read.signals, stages) for one in read.classes]
             stages("simulate")
             report = make_data_set(
                 path,
@@ -83,13 +85,15 @@ def dataset(
         raise typer.Exit(1)
 
 
-def _signal_class(spec: ClassSpec, stages: Stages) -> SignalClass:
+def _signal_class(spec: ClassSpec, signals: Signals, stages: Stages) -> SignalClass:
     """A class with its model, derived and compiled where that is stale."""
     from ballpass.derive.emit.generate import generate
     from ballpass.runtime.many.data_set import SignalClass
+    from ballpass.runtime.many.signals import check_outputs
     from ballpass.runtime.model import load
 
-    folder = generate(spec.scene, progress=stages)
+    unknown = partial(check_outputs, signals=signals, label=spec.label)
+    folder = generate(spec.scene, progress=stages, inspect=unknown)
     stages("compile")
     model = load(folder)
     if model.has_stepper:

@@ -10,6 +10,7 @@ import inspect
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,7 +33,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults
+from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
@@ -138,6 +139,7 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
             raise RequestError(f"{both} were both given. Allowed: one of them. Omit one.")
     flags = {option.flag(name): (kind, option) for name, (kind, option) in kinds.items()}
     refuse_faults(flags, {option.flag(name): values[name] for name, (_, option) in kinds.items()})
+    refuse_unknown(kinds, values)
     return values
 
 
@@ -203,7 +205,7 @@ def _ask(
         question.refuse(values)
         folder, formats = _place(question, scene, out, format_, figures=figures)
         stages("read")
-        model, overrides = _source(question, scene, set_, values, stages)
+        model, overrides = _source(ask, scene, set_, values, stages)
         stages(question.stage)
         if "progress" in ask.__annotations__:
             values["progress"] = _progress(stages)
@@ -286,9 +288,10 @@ def _place(
 
 
 def _source(
-    question: Question, scene: Path, set_: list[str] | None, values: Mapping[str, Any], stages: Stages
+    ask: Callable[..., Any], scene: Path, set_: list[str] | None, values: Mapping[str, Any], stages: Stages
 ) -> tuple[Any, dict[str, float]]:
     """The scene's model or the run in a file, and numbers of ``--set``."""
+    question = declared(ask)
     if question.takes_runs and scene.suffix == ".nc":
         from ballpass.runtime.run.solution_file import load_solution
 
@@ -298,7 +301,16 @@ def _source(
     asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
     method = (values.get("method") or asked.run.method) if question.runs else "none"
     needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
-    model = load_model(scene, stages, method, None, values.get("rtol"), overrides=asked.overrides, needs=needs)
+    model = load_model(
+        scene,
+        stages,
+        method,
+        None,
+        values.get("rtol"),
+        overrides=asked.overrides,
+        needs=needs,
+        inspect=partial(refuse_unknown, options_of(ask), values),
+    )
     return model, asked.overrides
 
 

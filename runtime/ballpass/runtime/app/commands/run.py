@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -28,15 +30,31 @@ from ballpass.runtime.app.commands.shared import (
 from ballpass.runtime.app.commands.trade import read_error
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate
+from ballpass.runtime.contract.options import (
+    Cycles,
+    Duration,
+    Option,
+    Rtol,
+    SampleRate,
+    options_in,
+    refuse_unknown,
+)
+from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.solution import Solution
     from ballpass.runtime.run.start import RunEnd
+
+Of = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Quantity to report, and to which --error applies: peak_ball_force, drive_work. May be repeated.",
+        shown="Q",
+        names=option_names.quantities,
+    ),
+]
 
 #: Bytes of samples that are written without a remark.
 LARGE = 200_000_000
@@ -91,14 +109,7 @@ def run(
             "the run is estimated.",
         ),
     ] = None,
-    of: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--of",
-            metavar="Q",
-            help="Quantity to report, and to which --error applies: peak_ball_force, drive_work. May be repeated.",
-        ),
-    ] = None,
+    of: Of = None,
     all_: Annotated[
         bool, typer.Option("--all", help="All rows of the summary, with the names of the numbers.")
     ] = False,
@@ -141,6 +152,7 @@ def run(
             rtol,
             overrides=asked.overrides,
             needs=needs and f"ballpass run {needs}",
+            inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
         )
         stages("simulate")
         solution = model.simulate(

@@ -23,6 +23,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ballpass.runtime.app.interrupted import say_interrupted
+from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.report.plain import json_text
@@ -266,7 +267,11 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
 
 
 def read_own(
-    scene: Path, stages: Stages, read: Callable[[Path], _Read], manifest: Callable[[_Read], Manifest]
+    scene: Path,
+    stages: Stages,
+    read: Callable[[Path], _Read],
+    manifest: Callable[[_Read], Manifest],
+    inspect: Callable[[Manifest], None] | None = None,
 ) -> _Read:
     """Result of `read` for the scene's folder, derived where it is stale; a generated folder is read as it is.
 
@@ -276,14 +281,17 @@ def read_own(
     Parameters
     ----------
     manifest : function that gives the manifest of the result
+    inspect : called with the manifest before C is generated, where none is before `read`; raises to refuse
     """
     if scene.is_dir():
+        if inspect is not None:
+            inspect(read_manifest(scene))
         return read(scene)
     from ballpass.derive.emit.generate import generate
     from ballpass.derive.emit.signature import source_key
 
     for _ in range(ATTEMPTS):
-        folder = generate(scene, progress=stages)
+        folder = generate(scene, progress=stages, inspect=inspect)
         found = read(folder)
         if manifest(found).source == source_key(scene):
             return found
@@ -302,6 +310,7 @@ def load_model(
     *,
     overrides: Mapping[str, float],
     needs: str = "",
+    inspect: Callable[[Manifest], None] | None = None,
 ) -> Model:
     """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take.
 
@@ -310,6 +319,7 @@ def load_model(
     overrides : numbers of ``--set``; refused where the linkage locks with them
     needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
         derived; empty for others
+    inspect : see `read_own`: refuses names that the model does not have
     """
     from ballpass.runtime.contract.method_registry import STEPPERS
     from ballpass.runtime.model import load
@@ -323,7 +333,7 @@ def load_model(
         stages("compile")
         return load(folder)
 
-    model = read_own(scene, stages, compiled, lambda model: model.manifest)
+    model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
     if any(path.startswith("mechanism.") for path in overrides):
         model.check_assembly(overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,15 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, show
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, options_in, refuse_unknown
+from ballpass.runtime.questions import option_names
+
+Of = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Output to keep, inner.ax; may be repeated. Default: all.", shown="OUTPUT", names=option_names.outputs
+    ),
+]
 
 
 def stream(
@@ -19,10 +29,7 @@ def stream(
     sample_rate: Annotated[float, Option(words="Samples a second.", example='"51.2 kHz"', shown="RATE", unit="Hz")],
     cycles: Cycles = None,
     duration: Duration = None,
-    of: Annotated[
-        list[str] | None,
-        typer.Option("--of", metavar="OUTPUT", help="Output to keep, inner.ax; may be repeated. Default: all."),
-    ] = None,
+    of: Of = None,
     set_: options.Settings = None,
     rtol: Rtol = None,
 ) -> None:
@@ -30,7 +37,8 @@ def stream(
     with command(scene) as stages:
         stages("read")
         asked = read_asked(scene, set_, duration)
-        model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
+        unknown = partial(refuse_unknown, options_in({"of": Of}), {"of": of})
+        model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides, inspect=unknown)
         stages("simulate")
         statistics = model.stream(
             out,

@@ -7,6 +7,8 @@ what ran (JSON).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -33,11 +35,22 @@ from ballpass.runtime.app.commands.shared import (
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
+from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.runtime.contract import Manifest
+
+Of = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Quantity: peak_ball_force (or max:ball.force), rms:inner.y, range:inner.x, mean:, min:, end: ... May be "
+        "repeated. Peak ball force and motion of the inner ring if none is given.",
+        shown="Q",
+        names=option_names.quantities,
+    ),
+]
 
 #: Most members that the terminal shows one by one; of more only the extremes.
 ROWS = 24
@@ -59,14 +72,7 @@ def sweep(
             "With :log after N they are spaced by a factor. May be repeated: all combinations run.",
         ),
     ] = None,
-    of: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="Q",
-            help="Quantity: peak_ball_force (or max:ball.force), rms:inner.y, range:inner.x, mean:, min:, end: ... May "
-            "be repeated. Peak ball force and motion of the inner ring if none is given.",
-        ),
-    ] = None,
+    of: Of = None,
     set_: options.Settings = None,
     cycles: Cycles = None,
     duration: Duration = None,
@@ -133,7 +139,14 @@ def sweep(
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
         with connected(scheduler, workers) as client:
             model = load_model(
-                scene, stages, method or usual, at_kinks, rtol, overrides=overrides, needs="ballpass sweep"
+                scene,
+                stages,
+                method or usual,
+                at_kinks,
+                rtol,
+                overrides=overrides,
+                needs="ballpass sweep",
+                inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
             )
             if model.states:
                 _ = model.ensemble_driver  # compiled here, where it is announced

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.show.progress import Progress
@@ -28,6 +29,7 @@ Of = Annotated[
         words="Quantity whose error counts, as for a sweep: `peak_ball_force`, `rms:inner.y`, `range:inner.x`. May be "
         "repeated. Peak ball force, rms and range of the inner ring's motion if none is given.",
         shown="Q",
+        names=option_names.quantities,
     ),
 ]
 Against = Annotated[
