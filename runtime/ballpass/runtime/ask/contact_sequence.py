@@ -20,15 +20,14 @@ from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import DEFLECTION
-from ballpass.runtime.quantity.nodes import Nodes, make_edges
+from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges
 from ballpass.runtime.quantity.track import ChannelValues, follow
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.locating import kinks_with_derivatives
-from ballpass.runtime.run.loop import StepEnds, start_run
+from ballpass.runtime.run.loop import segments_of, step_ends
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
-from ballpass.runtime.run.segments import joined_segments, run_windows
 from ballpass.runtime.run.start import RunEnd
 
 #: Parts of a step at whose ends contacts are evaluated.
@@ -165,16 +164,13 @@ def _deflections(
         transient_cycles=0.0,
         kinks=kinks,
     )
-    run, ends = resolve(model, numbers, request), StepEnds()
-    start_run(run, [ends]).go_on()
-    corners = np.unique([run.begin, *ends.all[:, 0].tolist(), run.end])
+    run = resolve(model, numbers, request)
+    corners = np.unique([run.begin, *step_ends(run).tolist(), run.end])
     between = corners[:-1, None] + np.diff(corners)[:, None] * np.arange(PARTS) / PARTS
     t = np.append(between.ravel(), run.end)
-    (segments,) = joined_segments(run_windows(model, numbers, (run.begin, run.end), run.turn, run.start), all_=True)
+    segments = segments_of(run)
     held = np.clip(np.searchsorted(segments.times, t) - 1, 0, len(segments.inputs) - 1)
-    zeros, flat = np.zeros(len(t)), np.zeros((len(t), 0))
-    places = Nodes(t=t, weight=zeros, segment=held, fraction=zeros, held=held, slope=flat, weight_slope=flat)
-    seen = channels.along(follow(run, segments, make_edges(run, segments, None), places), numbers)
+    seen = channels.along(follow(run, segments, make_edges(run, segments, None), fixed_nodes(t, held, held)), numbers)
     return t, [seen[name].value for name in channels.channels]
 
 

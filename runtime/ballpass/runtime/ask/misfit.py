@@ -28,9 +28,9 @@ from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.quantity.track import ChannelValues, follow
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.locating import kinks_with_derivatives
+from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.segments import joined_segments, run_windows
 
 #: Kinds of unknowns that belong to the measurement, not to the machine.
 NUISANCES = ("shift", "gain", "offset")
@@ -304,8 +304,7 @@ class Misfit:
         """All samples of a trial by output, likewise."""
         model, trial, names = self._model, self._trials[place], [one.name for one in self.ranges]
         numbers = run.numbers
-        windows = run_windows(model, numbers, (run.begin, run.end), run.turn, run.start)
-        (segments,) = joined_segments(windows, all_=True)
+        segments = segments_of(run)
         # the first parameter once more, at times that move by one: the difference to it is the derivative by time
         chain = Chain(model, numbers, [*names, names[0]])
         t = self._begin + trial.t + shift

@@ -49,7 +49,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import Request, asked_length
-from ballpass.runtime.run.resolve import Run, check_transient
+from ballpass.runtime.run.resolve import Run, asked_transient
 
 Array = NDArray[np.float64]
 
@@ -102,8 +102,7 @@ def length_request(
         Both cycles and duration, or numbers that are none.
     """
     turns, time = asked_length(model, cycles, duration)
-    dropped = model.run_settings.transient_cycles if transient is None else transient
-    return Request(cycles=turns, duration=time, transient_cycles=check_transient(dropped))
+    return Request(cycles=turns, duration=time, transient_cycles=asked_transient(model, transient))
 
 
 def make_query(

@@ -37,7 +37,7 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
-from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory
+from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.run.resolve import check_span
 
@@ -340,13 +340,7 @@ def _threads(given: int | None) -> int:
 
 def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
     """Lengths of the members' runs; members for which there is none are refused."""
-    if cycles is not None and duration is not None:
-        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
-    if cycles is None and duration is None:
-        cycles, duration = model.run_settings.cycles, model.run_settings.duration
-    for name, value in (("cycles", cycles), ("duration", duration)):
-        if value is not None and not 0.0 < real(value) < np.inf:
-            raise RequestError(f"{name}: a number above 0 is expected, not {value!r:.80}.")
+    cycles, duration = asked_length(model, cycles, duration)
     count = len(members)
     durations, turns, starts = np.zeros(count), np.full(count, np.inf), np.zeros(count)
     mechanism, bearing = model.manifest.mechanism, model.manifest.bearing

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, Nodes, find
+from ballpass.runtime.quantity.nodes import Edges, Nodes, find, fixed_nodes
 from ballpass.runtime.quantity.track import Signal, Track
 
 Array = NDArray[np.float64]
@@ -107,7 +107,8 @@ def find_extremes(
         for bracket in every:
             bracket.times = np.linspace(bracket.low, bracket.high, GRID)
         times = np.concatenate([bracket.times for bracket in every])
-        seen = look(_nodes(edges, times, np.repeat([bracket.segment for bracket in every], GRID)))
+        segment = np.repeat([bracket.segment for bracket in every], GRID)
+        seen = look(fixed_nodes(times, segment, edges.segment[segment]))
         for k, bracket in enumerate(every):
             bracket.values = seen[bracket.wanted.channel].value[k * GRID : (k + 1) * GRID]
             best = _top(_height(bracket))
@@ -174,14 +175,6 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
             found.append((segment, wanted.seen - reach, wanted.seen + reach))
     empty = np.zeros(0)
     return [_Bracket(wanted=wanted, segment=s, low=a, high=b, times=empty, values=empty) for s, a, b in found]
-
-
-def _nodes(edges: Edges, t: Array, segment: NDArray[np.int_]) -> Nodes:
-    """Nodes at fixed times, without weight."""
-    still = np.zeros((len(t), 0))
-    held = edges.segment[segment]
-    zeros = np.zeros(len(t))
-    return Nodes(t=t, weight=zeros, segment=segment, fraction=zeros, held=held, slope=still, weight_slope=still)
 
 
 def _height(bracket: _Bracket) -> Array:

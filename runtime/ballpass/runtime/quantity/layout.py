@@ -38,8 +38,8 @@ from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
 from ballpass.runtime.run.locating import LOCATED
+from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import joined_segments, run_windows
 
 Array = NDArray[np.float64]
 
@@ -129,8 +129,7 @@ class NodeLayer:
         ends : of the steps, and whether they lie on a kink, shape (steps, 2)
         row : reductions of the run
         """
-        windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
-        (segments,) = joined_segments(windows, all_=True)
+        segments = segments_of(run)
         first = Layout(
             items=(),
             still=False,

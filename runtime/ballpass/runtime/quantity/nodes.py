@@ -159,6 +159,11 @@ def with_points(plan: NodePlan, points: Sequence[tuple[int, float]]) -> NodePlan
     segment = np.concatenate([plan.segment, [point[0] for point in points]]).astype(np.int_)
     fraction = np.concatenate([plan.fraction, [point[1] for point in points]])
     weight = np.concatenate([plan.weight, np.zeros(len(points))])
+    return ordered_plan(segment, fraction, weight)
+
+
+def ordered_plan(segment: NDArray[np.int_], fraction: Array, weight: Array) -> NodePlan:
+    """A plan with these nodes in order of time."""
     order = np.lexsort((fraction, segment))
     return NodePlan(segment=segment[order], fraction=fraction[order], weight=weight[order])
 
@@ -178,6 +183,12 @@ def place(plan: NodePlan, edges: Edges) -> Nodes:
         slope=left_slope + inner * (right_slope - left_slope),
         weight_slope=plan.weight[:, None] * (right_slope - left_slope),
     )
+
+
+def fixed_nodes(t: Array, segment: NDArray[np.int_], held: NDArray[np.int_], directions: int = 0) -> Nodes:
+    """Nodes at fixed times, without weight: for values there."""
+    zeros, still = np.zeros(len(t)), np.zeros((len(t), directions))
+    return Nodes(t=t, weight=zeros, segment=segment, fraction=zeros, held=held, slope=still, weight_slope=still)
 
 
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:

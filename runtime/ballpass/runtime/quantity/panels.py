@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, NodePlan
+from ballpass.runtime.quantity.nodes import Edges, NodePlan, ordered_plan
 
 Array = NDArray[np.float64]
 
@@ -243,5 +243,4 @@ def plan_of(panels: Panels, edges: Edges) -> NodePlan:
     segment = np.concatenate([np.repeat(panels.segment, len(GAUSS)), whole, whole]).astype(np.int_)
     fraction = np.concatenate([place.ravel(), sides])
     weight = np.concatenate([(WEIGHTS * rate).ravel(), 0.0 * sides])
-    order = np.lexsort((fraction, segment))
-    return NodePlan(segment=segment[order], fraction=fraction[order], weight=weight[order])
+    return ordered_plan(segment, fraction, weight)

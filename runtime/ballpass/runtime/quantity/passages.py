@@ -17,15 +17,14 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import APART, crossings
-from ballpass.runtime.quantity.nodes import Nodes, make_edges, place
+from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges, place
 from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.loop import StepEnds, start_run
+from ballpass.runtime.run.loop import segments_of, step_ends
 from ballpass.runtime.run.request import Request, check_memory
 from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.segments import joined_segments, run_windows
 
 Array = NDArray[np.float64]
 
@@ -113,12 +112,9 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
             for edge, times in driver_angle.edge_times(item, numbers.values, run.start, run.end):
                 parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
     if model.manifest.edges:
-        ends = StepEnds()
-        start_run(run, [ends]).go_on()
-        cuts, run = ends.all[:, 0], replace(run, progress=None)
+        cuts, run = step_ends(run), replace(run, progress=None)
         check_memory("Edges along a run of", len(GAUSS) * len(cuts), 16 * len(model.states), "Run fewer cycles.")
-        windows = run_windows(model, numbers, (run.begin, run.end), run.turn, run.start)
-        (segments,) = joined_segments(windows, all_=True)
+        segments = segments_of(run)
         edges = make_edges(run, segments, None)
         panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
         passed = find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges)))
@@ -143,8 +139,6 @@ def _there(
     run: Run, track: Track, times: Array, chain: Chain | None = None, sensitivity_rtol: float | None = None
 ) -> Track:
     """The run at these fixed times."""
-    still = np.zeros((len(times), 0 if chain is None else len(chain.names)))
     held = np.searchsorted(track.segments.times, times) - 1
-    zeros = np.zeros(len(times))
-    nodes = Nodes(t=times, weight=zeros, segment=held, fraction=zeros, held=held, slope=still, weight_slope=still)
+    nodes = fixed_nodes(times, held, held, 0 if chain is None else len(chain.names))
     return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol)

@@ -24,7 +24,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.resolve import Run, asked_transient, resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
 
 #: Relative change of a life that counts as zero [1].
@@ -73,7 +73,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     """
     manifest = model.manifest
     turn = driver_angle.period(manifest, numbers.values)
-    transient = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    transient = asked_transient(model, request.transient_cycles)
     timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
     given = request.cycles is not None or request.duration is not None
     doubles = not given and not timed and math.isfinite(turn)

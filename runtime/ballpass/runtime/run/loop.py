@@ -297,6 +297,20 @@ class RunUnderWay:
         return RunFailed(outcome.end, outcome.time, outcome.step, self.state, place, detail)
 
 
+def segments_of(run: Run) -> Segments:
+    """All segments of a run."""
+    windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
+    (segments,) = joined_segments(windows, all_=True)
+    return segments
+
+
+def step_ends(run: Run) -> np.ndarray:
+    """Ends of the steps of a run, shape (steps,) [s]; SimulationError where it fails."""
+    ends = StepEnds()
+    start_run(run, [ends]).go_on()
+    return ends.all[:, 0]
+
+
 def start_run(run: Run, sinks: Sequence[Sink], segments: Segments | None = None) -> RunUnderWay:
     """A run before its first step; `segments`: all of it, where they are known."""
     known = segments if segments is not None and len(segments.inputs) < SEGMENTS_A_CALL else None

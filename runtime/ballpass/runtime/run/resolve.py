@@ -122,6 +122,11 @@ def check_transient(given: float) -> float:
     return real(given)
 
 
+def asked_transient(model: LoadedModel, given: float | None) -> float:
+    """Turns that do not count: as given, else from the model's run settings; checked."""
+    return check_transient(model.run_settings.transient_cycles if given is None else given)
+
+
 def resolve(
     model: LoadedModel,
     numbers: Numbers,
@@ -144,8 +149,7 @@ def resolve(
     """
     settings = model.manifest.run
     turn = driver_angle.period(model.manifest, numbers.values)
-    given = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
-    transient = check_transient(given)
+    transient = asked_transient(model, request.transient_cycles)
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)
     begin, initial = start_time(request.initial), start_state(model, numbers, request.initial)
     if duration is None:

@@ -27,7 +27,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, check_transient, resolve
+from ballpass.runtime.run.resolve import Run, asked_transient, resolve
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
 from ballpass.runtime.show import html
@@ -107,8 +107,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     if not (real(most) >= 2 * LEAST and int(most) == most):
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
-    given = model.run_settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
-    transient = check_transient(given)
+    transient = asked_transient(model, request.transient_cycles)
     turns = LEAST
     turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)

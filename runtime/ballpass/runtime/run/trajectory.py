@@ -15,9 +15,10 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
+from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.sampling import Sampling
-from ballpass.runtime.run.segments import check_count, joined_segments, run_windows, time_resolution
+from ballpass.runtime.run.segments import check_count, time_resolution
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -67,10 +68,8 @@ class Interrupted(Exception):
 def start_trajectory(run: Run, sampling: Sampling) -> Trajectory:
     """Memory for the samples of a run, and the segments they lie in."""
     near = time_resolution(run.begin, run.end, run.turn)
-    interval = (run.begin, run.end)
     check_count(run.model.manifest.inputs, run.numbers, run.duration, run.turn)
-    windows = run_windows(run.model, run.numbers, interval, run.turn, run.start)
-    (segments,) = joined_segments(windows, all_=True)
+    segments = segments_of(run)
     stops = np.searchsorted(sampling.times, segments.times - near)
     stops[0], stops[-1] = 0, len(sampling.times)
     return Trajectory(
