@@ -12,7 +12,7 @@ Everything of bearing b is named ``bp_<b>_...`` and ``BP_<b>_...``; ``BP_EACH_BE
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import accumulate
 
 import casadi as ca
@@ -246,18 +246,14 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
     if kernels.windows:
         borders = [k for k in places if system.inputs[k].windows]
         sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": first}
-        flags["has_rate"] += [1.0] * len(borders)
-        for key in ("ends_above", "ends_below", "of_rate"):
-            flags[key] += [0.0] * len(borders)
+        _flag_borders(flags, len(borders))
         of_driver = [int(s.angle == DRIVER_ANGLE) for s in system.switches if s.angle is not None]
         parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders)]
         parts += [_integers("bp_window_of_driver", of_driver), *map(_single, kernels.windows)]
     if kernels.stops:
         borders = [k for k in places if not system.inputs[k].windows]
         sizes |= {"BP_STOPS": len(borders), "BP_FIRST_STOP": len(flags["of_rate"])}
-        flags["has_rate"] += [1.0] * len(borders)
-        for key in ("ends_above", "ends_below", "of_rate"):
-            flags[key] += [0.0] * len(borders)
+        _flag_borders(flags, len(borders))
         parts += ["#define BP_HAS_STOPS", _integers("bp_stop_input", borders), *map(_single, kernels.stops)]
     if not flags["of_rate"]:
         return None
@@ -269,6 +265,12 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
         "   a rate comes with the switching function. */\n" + tables,
     ]
     return _header("SWITCHES", [*head, *parts])
+
+
+def _flag_borders(flags: Mapping[str, list[float]], count: int) -> None:
+    """Add borders of the motion: no force ends there, and a rate comes with the switching function."""
+    for key, listed in flags.items():
+        listed += [float(key == "has_rate")] * count
 
 
 def ensemble_header(kernels: Kernels) -> str:

@@ -5,11 +5,17 @@ In: a scene, the path of a number, the text given for it.  Out: the range of the
 
 from __future__ import annotations
 
-from ballpass.derive.scene.designations import GROUPS, bearing_types
+from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Scene
 from ballpass.derive.scene.table import listing
 from ballpass.derive.scene.units import show
+
+
+def no_group(kind: BearingType) -> tuple[str, str]:
+    """Problem and allowed groups, where a bearing's bore has not the group that is named."""
+    allowed = listing([group for group in GROUPS if kind.clearance(group) is not None])
+    return f"ISO 5753-1 has no such group for a bore of {kind.bore} mm", allowed
 
 
 def clearance_of_group(scene: Scene, path: str, written: str) -> tuple[float, float, float] | None:
@@ -36,8 +42,7 @@ def clearance_of_group(scene: Scene, path: str, written: str) -> tuple[float, fl
         )
     span = kind.clearance(written)
     if span is None:
-        problem = f"ISO 5753-1 has no such group for a bore of {kind.bore} mm"
-        allowed = listing([group for group in GROUPS if kind.clearance(group) is not None])
+        problem, allowed = no_group(kind)
         raise SceneError(
             [Fault(key=path, problem=problem, given=show(written), allowed=allowed, remedy="name one of them")]
         )

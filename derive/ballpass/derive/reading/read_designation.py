@@ -9,6 +9,7 @@ from __future__ import annotations
 from decimal import Decimal
 
 from ballpass.derive.bearing.elements import ELEMENTS
+from ballpass.derive.reading.clearance_groups import no_group
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
 from ballpass.derive.scene.keys import TextKey
@@ -83,8 +84,7 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
             f'add designation = "6204", or {remedy}',
         )
     elif given in GROUPS and kind is not None:
-        problem = f"ISO 5753-1 has no such group for a bore of {kind.bore} mm"
-        allowed = listing([group for group in GROUPS if kind.clearance(group) is not None])
+        problem, allowed = no_group(kind)
         remedy = f"name one of them, or {remedy}"
     elif kind is not None and isinstance(given, str) and given[:1].isalpha():
         problem = "this is not a clearance group"

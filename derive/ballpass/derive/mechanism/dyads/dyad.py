@@ -11,7 +11,7 @@ two equations at a time, by Cramer's rule.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Self
 
@@ -202,6 +202,23 @@ def span_length(ledger: Ledger, body: str, span: Pair) -> sp.Expr:
         f"distance of the two joints of {body}",
         f"l_{{{subscript(body)}}}",
     )
+
+
+def name_base(ledger: Ledger, inner: Joint, names: str, ends: Sequence[Motion]) -> tuple[Pair, sp.Expr]:
+    """Name the vector between the outer joints, and its square; `names`: from which joint to which."""
+    prefix, mark = f"joint.{inner.name}", subscript(inner.name)
+    base = ledger.name_pair(
+        f"{prefix}.base",
+        "",
+        subtract(ends[1].position, ends[0].position),
+        "m",
+        f"component of the line {names}",
+        f"d_{{{mark},AXIS}}",
+    )
+    square = ledger.define(
+        f"{prefix}.base_squared", dot(base, base), "m^2", f"square of the distance {names}", f"d_{{{mark}}}^{{2}}"
+    )
+    return base, square
 
 
 def name_span(ledger: Ledger, body: str, vector: Pair) -> Pair:

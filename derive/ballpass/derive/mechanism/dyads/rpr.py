@@ -19,6 +19,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
     Placement,
     guide_axis,
     name_acceleration,
+    name_base,
     name_direction,
     name_gap,
     name_hinge,
@@ -68,17 +69,7 @@ class RPR(Dyad):
             name_hinge(ledger, mechanism, joint, host, play) for joint, host in zip(self.outer, hosts, strict=True)
         ]
         starts = [joint_point(mechanism, joint, body) for joint, body in zip(self.outer, self.bodies, strict=True)]
-        span = ledger.name_pair(
-            f"{prefix}.base",
-            "",
-            subtract(hinges[1].position, hinges[0].position),
-            "m",
-            f"component of the line {names}",
-            f"d_{{{mark},AXIS}}",
-        )
-        square = ledger.define(
-            f"{prefix}.base_squared", dot(span, span), "m^2", f"square of the distance {names}", f"d_{{{mark}}}^{{2}}"
-        )
+        span, square = name_base(ledger, guide, names, hinges)
         # In the axes that both bodies share: d = to_guide + travel t − to_hinge, with the components x and e.
         axis = guide_axis(guide)
         rail, shoe = (joint_point(mechanism, guide, body) for body in (first, second))

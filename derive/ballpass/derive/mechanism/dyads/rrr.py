@@ -19,6 +19,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
     Placement,
     body_span,
     name_acceleration,
+    name_base,
     name_gap,
     name_hinge,
     name_rate,
@@ -71,17 +72,7 @@ class RRR(Dyad):
         one, two = (span_length(ledger, body, span) for body, (_, span) in zip(bodies, spans, strict=True))
 
         names = f"from {self.outer[0].name} to {self.outer[1].name}"
-        base = ledger.name_pair(
-            f"{prefix}.base",
-            "",
-            subtract(ends[1].position, ends[0].position),
-            "m",
-            f"component of the line {names}",
-            f"d_{{{mark},AXIS}}",
-        )
-        square = ledger.define(
-            f"{prefix}.base_squared", dot(base, base), "m^2", f"square of the distance {names}", f"d_{{{mark}}}^{{2}}"
-        )
+        base, square = name_base(ledger, inner, names, ends)
         difference, total = one - two, one + two
         heron = ledger.define(
             f"{prefix}.heron",
