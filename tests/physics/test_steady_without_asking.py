@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, load
+from ballpass.runtime import Model, Solution, load, load_results
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.export.c_program import export_c, started
@@ -59,6 +59,24 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return made(tmp_path_factory.mktemp("plain"), FOUR)
 
 
+@pytest.mark.parametrize(
+    ("run", "turns"),
+    [
+        ("", (60.0, 50.0, False)),
+        ('[run]\noutputs = ["inner.ax"]\n', (60.0, 50.0, False)),
+        ("[run]\nsamples_per_cycle = 500\n", (60.0, 50.0, False)),
+        ("[run]\ntransient_cycles = 5\n", (15.0, 5.0, True)),
+        ("[run]\ncycles = 5\n", (5.0, 0.0, True)),
+    ],
+)
+def test_an_output_more_does_not_ask_for_a_length_of_the_run(run: str, turns: tuple[float, float, bool]) -> None:
+    """What a run does not say is that of a scene without one: who names an output need not know how long to run."""
+    scene = scene_from_text(FOUR + run, "scene")
+    assert (scene.run.cycles, scene.run.transient_cycles, scene.run.stated) == turns
+    assert scene.outputs == (("inner.ax",) if "inner.ax" in run else ("*",))
+    assert scene.run.at_rest == ("transient" not in run)
+
+
 def test_rings_at_rest_do_not_fall_through_their_clearance(plain: Model, tmp_path: Path) -> None:
     steady = plain.reduce()["ball.force"].maximum
     assert plain.reduce().duration == pytest.approx(10 * plain.period())
@@ -70,6 +88,26 @@ def test_rings_at_rest_do_not_fall_through_their_clearance(plain: Model, tmp_pat
     assert stated.parameters["bearing.initial.inner.y"] == 0.0
     transient = made(tmp_path / "transient", FOUR + RUN + "transient_cycles = 0\n")
     assert transient.parameters["bearing.initial.inner.y"] == 0.0
+
+
+def test_the_file_of_a_run_without_stated_turns_has_the_steady_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fifty turns of a transient that nobody asked for were five sixths of the file; asked-for turns are all there."""
+    monkeypatch.chdir(tmp_path)
+    Path("crank.toml").write_text(FOUR, encoding="utf-8")
+
+    def solution(*words: str) -> Solution:
+        done = CliRunner().invoke(app, ["run", "crank.toml", "--no-figures", *words])
+        assert done.exit_code == 0, done.output
+        return load_results("results/crank").solution
+
+    found = solution()
+    assert (found.t[0], found.t[-1]) == (pytest.approx(5.0), pytest.approx(6.0))  # turns of 0.1 s
+    assert len(found.steady().t) == len(found.t) == 20001
+    assert found.end.time == found.t[-1]  # from where --initial continues
+    asked = solution("--cycles", "3", "--transient", "2")
+    assert (asked.t[0], len(asked.t), len(asked.steady().t)) == (0.0, 6001, 2001)
 
 
 def test_settling_drops_the_start(plain: Model) -> None:

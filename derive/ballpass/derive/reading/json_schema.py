@@ -94,7 +94,10 @@ def _required(section: Section) -> list[str]:
 def _rules(section: Section) -> dict[str, Any]:
     """Of the groups of keys one is given."""
     either = section.either
-    return {} if either is None else {"oneOf": [{"required": [*group]} for group in either.groups]}
+    if either is None:
+        return {}
+    given = [{"required": [*group]} for group in either.groups]
+    return {"oneOf": [*given, {"not": {"anyOf": given}}]} if either.optional else {"oneOf": given}
 
 
 def _of_variant(own: Sequence[Section], variant: tuple[str, str]) -> dict[str, Any]:

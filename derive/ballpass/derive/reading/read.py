@@ -47,8 +47,8 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
-#: The run of a scene without [run]: so many turns are dropped that what is left is the steady machine.
-STEADY = {"cycles": 60, "transient_cycles": 50, "outputs": ["*"]}
+#: Turns of a run whose length is not given, and those before them that it drops: what is left is the steady machine.
+STEADY_CYCLES, DROPPED_CYCLES = 10.0, 50.0
 
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
@@ -235,8 +235,9 @@ def _read(root: Table, name: str) -> Scene:
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
         run, outputs = _read_run(root.table("run", required=False))
-        stated = root.data.get("run", {})
-        transient = isinstance(stated, dict) and "transient_cycles" in stated
+        given = root.data.get("run")
+        turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
+        transient = "transient_cycles" in turns
         seated = not transient and not any(_states_start(root))
         scene = Scene(
             name=name,
@@ -246,7 +247,7 @@ def _read(root: Table, name: str) -> Scene:
             loads=loads,
             bearings=bearings,
             outputs=outputs,
-            run=replace(run, at_rest=seated, stated="run" in root.data),
+            run=replace(run, at_rest=seated, stated=bool(turns)),
         )
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
@@ -259,11 +260,14 @@ def _states_start(root: Table) -> Iterator[bool]:
 
 
 def _read_run(table: Table) -> tuple[RunSettings, tuple[str, ...]]:
-    """Length, samples and method of a run, and the names of its outputs; without the table that of the steady one."""
-    if table.missing:
-        table = Table(table.collector, table.path, dict(STEADY))
+    """Length, samples and method of a run, and the names of its outputs; without a length the steady machine's."""
+    if table.missing:  # not a fault
+        table = Table(table.collector, table.path, {})
     with table:
         run = read_record(RunSettings, table)
+        if run.cycles is None and run.duration is None:
+            dropped = run.transient_cycles if "transient_cycles" in table.data else DROPPED_CYCLES
+            run = replace(run, cycles=dropped + STEADY_CYCLES, transient_cycles=dropped)
         if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:
             table.fault(
                 "transient_cycles",

@@ -21,6 +21,7 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
 from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+from ballpass.runtime.contract.units import split_setting
 
 #: Last parts of keys of the file that are no quantities, for the message about an override of one.
 _STRUCTURE = ("balls", "designation", "joint", "law", "support")
@@ -112,7 +113,7 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
     SceneError
         No "=", an unknown path (the nearest ones are named), or no quantity of its unit.
     """
-    path, equals, value = (part.strip() for part in text.partition("="))
+    path, equals, value = split_setting(text)
     if not equals:
         raise SceneError(
             [

@@ -27,17 +27,19 @@ class Either:
     what : name of what they give, "the coefficient"
     groups : of keys, the usual one first; the keys of the other groups are None
     at : key that a second group is reported at; the table itself by default
+    optional : none may be given
     """
 
     what: str
     groups: tuple[tuple[str, ...], ...]
     at: str = ""
+    optional: bool = False
 
     def choose(self, table: Table, keys: Mapping[str, Key]) -> tuple[str, ...]:
-        """The group that is given; none, with a fault, where there is none, and the first of several."""
+        """The group that is given; where there is none, none, with a fault unless optional; the first of several."""
         table.know(*(key for group in self.groups for key in group))
         given = [group for group in self.groups if any(key in table.data for key in group)]
-        if table.missing or len(given) == 1:
+        if table.missing or len(given) == 1 or (self.optional and not given):
             return given[0] if given else ()
         found = [[key for key in group if key in table.data] for group in given]
         samples = [[f"{key} = {keys[key].sample}" if key in keys else key for key in group] for group in self.groups]

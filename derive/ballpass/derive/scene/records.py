@@ -385,11 +385,13 @@ class Load:
 class RunSettings:
     """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s].
 
+    Where the file gives neither, the run is that of the steady machine.
+
     Where the file gives neither a transient nor the rings' initial state, they start `at_rest` under the load of t = 0.
-    It is not `stated` where the file has no run: its turns are then those of the steady machine.
+    It is not `stated` where the file gives no turns at all: which are transient is then found.
     """
 
-    either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
+    either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)), optional=True)
 
     cycles: float | None = positive("1", "Turns of driver or shaft", example=4, setting=True)
     duration: float | None = positive("s", "Duration of the run", example="0.5 s", setting=True)
@@ -439,6 +441,8 @@ OUTPUTS = NamesKey(
     words="Names or patterns of what is computed",
     two=False,
     example='["inner.*", "ball.force"]',
+    default=("*",),
+    when='default `["*"]`, all',
     note='only these are computed. {doc}`outputs` lists all, also those on request, such as `"point.slider.C.ay"`',
 )
 

@@ -166,7 +166,7 @@ class RunInfo:
     """Run settings of the scene file; exactly one of `cycles` and `duration` [s] is given.
 
     `at_rest`: rings start at rest under the load of t = 0, for the scene says neither where nor what is transient.
-    `stated`: whether the scene has a run; otherwise its turns are those of the steady machine.
+    `stated`: whether the scene gives turns of its run; otherwise they are those of the steady machine.
     """
 
     cycles: float | None

@@ -171,6 +171,13 @@ def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> f
     return value
 
 
+def split_setting(text: str) -> tuple[str, str, str]:
+    """Path, equals sign and value of ``PATH=VALUE``; the value may stand in quotes, as in a scene file."""
+    path, equals, value = (part.strip() for part in text.partition("="))
+    quoted = len(value) > 1 and value[0] == value[-1] and value[0] in "\"'"
+    return path, equals, value[1:-1] if quoted else value
+
+
 def show(given: object, limit: int = 60) -> str:
     """A value as it is written in the file, shortened to `limit` characters."""
     if isinstance(given, str):

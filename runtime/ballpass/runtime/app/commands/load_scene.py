@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.contract.units import split_setting
 from ballpass.runtime.plot import FORMATS
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
     units = {info.name: info.unit for info in manifest.parameters}
     found: dict[str, float] = {}
     for text in settings:
-        path, _, value = (part.strip() for part in text.partition("="))
+        path, _, value = split_setting(text)
         if path.startswith("run."):
             raise RequestError(
                 f"--set {text}: a setting of the run, not a parameter of the model. Allowed: {', '.join(RUN_OPTIONS)} "
