@@ -189,7 +189,7 @@ def test_without_json_a_table_and_the_place_of_the_results_are_printed(
     result = ballpass(site.folder, *words, "--transient", "1")
     assert result.exit_code == 0, result.stderr
     assert "Highest ball force: " in result.stdout
-    assert f"results in {out}: solution.nc, summary.json" in result.stdout
+    assert f"results in {out}: solution.nc, summary.json" in " ".join(result.stdout.split())
     assert sorted(path.name for path in out.glob("[!.]*")) == ["solution.nc", "summary.json"]
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["steady_cycles"]["value"] == pytest.approx(2.0)

@@ -94,7 +94,9 @@ def test_new_prints_the_command_that_runs_the_copy(tmp_path: Path, monkeypatch: 
     unknown = call("new", "rotr")
     assert unknown.exit_code == 2
     assert "rotor" in unknown.stderr
-    assert call("new").exit_code == 2
+    plain = call("new")
+    assert (plain.exit_code, plain.stdout) == (0, call("new", "--list").stdout)
+    assert all(len(line) <= 80 for line in plain.stdout.splitlines())
 
 
 def test_new_copies_a_data_set_with_its_scene_and_keeps_a_scene_that_is_there(tmp_path: Path) -> None:

@@ -81,6 +81,25 @@ def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
     assert not (site / "never").exists()
 
 
+def test_a_value_in_quotes_as_in_a_scene_file_is_taken(ballpass: Callable[..., Result]) -> None:
+    """A shell removes one pair of quotes; `'path="20 um"'` has two.  Both before and after the model is generated."""
+    words = ("--no-figures", "--cycles", "1", "--transient", "0", "--json")
+    plain = json.loads(ballpass("run", SCENE, *words, "--set", "bearing.clearance=20 um").stdout)
+    for quoted in ('bearing.clearance="20 um"', "bearing.clearance = '20 um'"):
+        done = ballpass("run", SCENE, *words, "--set", quoted)
+        assert json.loads(done.stdout)["peak_ball_force"] == plain["peak_ball_force"], done.output
+    odd = ballpass("run", SCENE, *words, "--set", 'bearing.clearance="20 um')
+    assert (odd.exit_code, "no number in front" in odd.stderr) == (2, True)
+
+
+def test_export_says_what_it_wrote_and_how_to_run_it(site: Path, ballpass: Callable[..., Result]) -> None:
+    done = ballpass("export", SCENE, "--c", "--out", "a program")
+    assert done.stdout == "a program\n"
+    assert "make -C 'a program' run builds it" in done.stderr
+    assert "README.md" in done.stderr
+    assert (site / "a program" / "README.md").is_file()
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -17,6 +17,7 @@ from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.app.summary_words import stands_out
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.report.html import table_html
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.text import show, table_text
 from ballpass.runtime.run.settle import look_further
@@ -143,11 +144,23 @@ def test_table_fits_a_terminal_and_shows_micrometres(press: tuple[Model, Solutio
     every, none = render_summary(summary, press[0].manifest, every=True)
     assert none == 0
     assert len(every.rows) == len(table.rows) + left_out
+    assert max(map(len, table_text(every).splitlines())) <= 80
     row = next(line for line in text.splitlines() if line.split()[:3] == ["Inner", "ring,", "y"])
     assert float(row.split()[4]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
     assert row.split()[-1] == "µm"
     assert "2 transient cycles" in " ".join(text.split())
     assert "one-sided" in text
+
+
+@pytest.mark.parametrize("digits", [1, 2, 4])
+def test_rounded_numbers_are_those_of_format_without_its_exponents(digits: int) -> None:
+    """From a ten-thousandth to a million; beyond, the exponent counts more than the zeros."""
+    for power in range(-9, 12):
+        for value in (1.23456 * 10.0**power, -9.99999 * 10.0**power, 10.0**power):
+            text = rounded(value, digits)
+            assert float(text) == float(f"{value:.{digits}g}")
+            assert ("e" in text) == (abs(float(text)) < 1e-4 or abs(float(text)) >= 1e6), text
+    assert rounded(-0.0, digits) == "0"
 
 
 def test_sentences_on_top_name_the_peak_and_its_pressure(

@@ -36,6 +36,7 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.ratings.result_limits import VOID, limit_words, passed_limit
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -176,7 +177,7 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
             change = math.inf if kind == "total" else abs(value - before) / max(abs(before), abs(value), 1e-300)
             counts = (kind in ("min", "max") and peak > PEAKS) or (kind == "rms" and mean > MEANS)
             if change == math.inf or (counts and change > PEAKS):
-                now, first = (f"{factor * number:z.4g}" for number in (value, before))
+                now, first = (rounded(factor * number) for number in (value, before))
                 than = f"instead of {first}" if now != first else "as before"
                 row = f"{entry}.{kind}" if kind in _BALL_FORCES else entry
                 words = inside(row_words(manifest, row)) + ("" if kind in _BALL_FORCES else f", {kind}")

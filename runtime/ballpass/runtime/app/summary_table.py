@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ballpass.runtime.app.summary_words import row_place, row_words, written
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import parse_quantity
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import ReportTable
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
         if name.startswith("point."):  # the size of a machine, not of a clearance
             factor, unit = 1e3, "mm"
         dust = rounding.get(item["unit"], 0.0)
+        unit = "" if unit == "1" else unit
         found = {name: tuple(_cell(item, key, factor, dust) for key in columns)}
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
@@ -83,7 +85,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
         heads=("", *columns, "unit"),
         rows=[row for _, row in rows],
         right=columns,
-        wrapped=() if every else ("",),
+        wrapped=("",),
         caption=_caption(summary, every=every, uncertain=any("±" in cell for _, cells in rows for cell in cells)),
     )
     return table, left_out
@@ -108,6 +110,13 @@ def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -
         return "0"
     number = written(item, key, factor, "\n")  # ± below it: three of these fill a line
     return number + ("*" if item.get("searched", {}).get(key) == "samples" and "±" not in number else "")
+
+
+def _of_run(key: str, value: float) -> str:
+    """A number about the run: a count whole, a change in per cent, others with four digits."""
+    if key == "growth":
+        return f"{rounded(100.0 * value, 2)} %"
+    return str(value) if isinstance(value, int) else rounded(value)
 
 
 def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
@@ -139,7 +148,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
 
 def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str:
     run = [
-        words.format(f"{summary[key]['value']:.4g}")
+        words.format(_of_run(key, summary[key]["value"]))
         for key, words in _RUN.items()
         if key in summary and summary[key]["value"] is not None
     ]

@@ -16,6 +16,7 @@ from typing import Any
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.ratings.elements import RatedElement
 from ballpass.runtime.ratings.of_bearing import contacts_of, rated_element
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.driver_angle import crank_angle
 
 #: What shortens a description, in this order.
@@ -35,8 +36,8 @@ _ADDED = {
     "peak_ball_force.total": "Highest ball force",
     "peak_ball_force.elastic": "Highest ball force, elastic part",
     "drive_work": "Work of the drive in a turn",
-    "reaction_condition.unscaled": "Condition number of Eq. (1)",
-    "reaction_condition.scaled": "Condition number of Eq. (1), scaled",
+    "reaction_condition.unscaled": "Condition number of the joint forces' equations",
+    "reaction_condition.scaled": "The same, with equations and forces scaled",
     "frequencies.shaft": "Shaft frequency",
     "frequencies.cage": "Cage frequency (FTF)",
     "frequencies.ball_pass_outer": "Ball pass, outer (BPFO)",
@@ -85,12 +86,12 @@ def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> s
     """
     value, spread = item[key], item.get("over_starts", {}).get(key)
     if spread is None or value == 0.0:
-        return f"{factor * value:z.4g}"
+        return rounded(factor * value)
     apart = max(2.0 * spread["std"], abs(value - spread["mean"]))
     if apart < 5e-5 * abs(value):  # all of four
-        return f"{factor * value:z.4g}"
+        return rounded(factor * value)
     digits = min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(apart)) + 1, 1), 4)
-    return f"{factor * value:z.{digits}g}{between}±{factor * apart:.1g}"
+    return f"{rounded(factor * value, digits)}{between}±{rounded(factor * apart, 1)}"
 
 
 def inside(words: str) -> str:

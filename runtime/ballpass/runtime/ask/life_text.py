@@ -11,6 +11,7 @@ from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
 from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import COEFFICIENTS
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
 
@@ -174,7 +175,9 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         f"static C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
         f"fatigue limit C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
         f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
-        ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
+        ReportTable(
+            heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring"), wrapped=("",)
+        ),
     ]
     if bearing.tilt is not None:
         parts.append(f"  {bearing.tilt.words}")
@@ -200,8 +203,9 @@ def _verdict(bearing: BearingStrength) -> str:
     shortest = bearing.life if bearing.modified_life is None else bearing.modified_life
     if shortest is None:
         return verdict
-    spent = "without limit" if math.isinf(shortest) else f"{bearing.hours(shortest):.0f} h or longer"
-    return f"{verdict} 90 % of such bearings run {spent}."
+    hours = bearing.hours(shortest)
+    spent = f"{hours:.0f} h or longer" if hours < MILLION else "more than a million hours"
+    return f"{verdict} 90 % of such bearings run {'without limit' if math.isinf(shortest) else spent}."
 
 
 def _duty_parts(life: DutyLife) -> _Parts:
@@ -228,11 +232,11 @@ def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
 def _life(turns: float, spent: float) -> tuple[str, str]:
     if math.isinf(turns):
         return "unlimited", "unlimited"
-    return f"{turns / MILLION:.4g}", f"{spent:.4g}" if spent < 1e4 else f"{spent:.0f}"
+    return rounded(turns / MILLION), f"{spent:.0f}" if 1e4 <= spent < MILLION else rounded(spent)
 
 
 def _million(turns: float | None) -> str:
-    return "" if turns is None else f"{turns / MILLION:.4g} million turns"
+    return "" if turns is None else f"{rounded(turns / MILLION)} million turns"
 
 
 def _hours(spent: float) -> str:
@@ -249,4 +253,4 @@ def _source(bearing: BearingStrength, rating: str, otherwise: str) -> str:
 
 def _wear(rate: float) -> str:
     """Depth a second as depth an hour."""
-    return f"{1e6 * 3600.0 * rate:.2g} um/h"
+    return f"{rounded(1e6 * 3600.0 * rate, 2)} µm/h"

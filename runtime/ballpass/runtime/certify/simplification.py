@@ -19,9 +19,11 @@ from ballpass.runtime.certify.method_choice import MethodChoice, compared_quanti
 from ballpass.runtime.certify.trade import MEMBERS, SPREAD, perturbed, reference
 from ballpass.runtime.certify.trade_report import PROMISED, milliseconds, percent
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
@@ -82,17 +84,12 @@ class Simplification:
 def rows(found: Simplification) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Head and rows of a table: quantity, both values, change, and its 95 % bound."""
     head = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
-    return head, [
-        (
-            name,
-            found.units[name],
-            f"{found.values[name]:z.4g}",
-            f"{found.simpler_values[name]:z.4g}",
-            f"{100.0 * found.change[name]:+z.3g} %",
-            percent(found.error[name]),
-        )
-        for name in found.quantities
-    ]
+    lines = []
+    for name in found.quantities:
+        factor, unit = table_unit(found.units[name])
+        both = (rounded(factor * values[name]) for values in (found.values, found.simpler_values))
+        lines.append((name, unit, *both, f"{100.0 * found.change[name]:+z.3g} %", percent(found.error[name])))
+    return head, lines
 
 
 def to_plain(found: Simplification) -> dict[str, Any]:

@@ -114,7 +114,9 @@ def life_of_clearance(
     panel.axvline(1e6 * present, color="#6c757d", linewidth=1.0, linestyle=":")
     panel.set(xlabel="diametral clearance in operation [µm]", ylabel="rating life $L_{10r}$ [million turns]")
     panel.margins(x=0.0)
-    panel.legend(loc="best")
+    panel.legend(
+        loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
+    )  # it may lie on the group
     shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""
     words = f"{len(clearances)} runs of {turns:.4g} steady turns. Dotted: the scene's clearance.{shaded}"
     caption(figure, f"{_titled(title, bearing)}: life against clearance", words)

@@ -25,6 +25,7 @@ from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.point.slopes import jacobian
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
@@ -133,9 +134,9 @@ class Explanation(ShortRepr, Reported):
             (
                 item.name,
                 f"{math.degrees(item.angle):.0f}°",
-                f"{item.decay:.3g} 1/s",
-                f"{item.frequency / math.tau:.3g} Hz",
-                f"{item.slowest:.3g} 1/s",
+                f"{rounded(item.decay, 3)} 1/s",
+                f"{rounded(item.frequency / math.tau, 3)} Hz",
+                f"{rounded(item.slowest, 3)} 1/s",
                 f"{item.stiffness:.2g}" if math.isfinite(item.stiffness) else "",
             )
             for item in self.scales

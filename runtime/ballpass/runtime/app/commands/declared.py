@@ -28,7 +28,7 @@ from ballpass.runtime.app.commands.shared import (
     load_model,
     name_of,
     note,
-    show,
+    show_files,
     show_json,
     warn,
 )
@@ -237,8 +237,8 @@ def _ask(
         show_report(report)
         if question.figures is not None and not question.always and out is None:
             note("figures and the report as JSON: --out DIR writes them.")
-        if written:
-            show(f"results in {folder}: {', '.join(path.name for path in written)}")
+        if folder is not None and written:
+            show_files(folder, [path.name for path in written])
     if report.fault:
         complain(report.fault)
         raise typer.Exit(1)

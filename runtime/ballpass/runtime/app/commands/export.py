@@ -6,6 +6,7 @@ a table over time, whose rows are equal.  There the driver's angle and speed are
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from ballpass.runtime.app.commands.shared import (
     command,
     generated_folder,
     name_of,
+    note,
     read_own,
     warn_of_scene,
 )
@@ -83,6 +85,9 @@ def export(
             export_c(generated_folder(scene), target, manifest=manifest)
         warn_of_scene(manifest)
     typer.echo(str(target))
+    if c:
+        place = shlex.quote(str(target))
+        note(f"a program in C99, described in its README.md. make -C {place} run builds it and writes {place}/out.csv.")
 
 
 def _speed_becomes_input(manifest: Manifest, inputs: Sequence[str]) -> bool:

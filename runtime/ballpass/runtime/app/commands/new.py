@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ballpass.runtime.app.commands.shared import command, show
+from ballpass.runtime.app.commands.shared import command, note, show
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.parameters import unknown_name
@@ -36,7 +36,7 @@ def new(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder to copy it to; made if it does not exist.")
     ] = Path(),
-    list_: Annotated[bool, typer.Option("--list", help="Print the names and titles of all.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="Print names and titles of all; so without NAME.")] = False,
 ) -> None:
     """Copy a scene or a data set that comes with ballpass into a folder. An existing file is not overwritten."""
     with command():
@@ -44,13 +44,13 @@ def new(
 
         scenes, data_sets = shipped_scenes(), shipped_data_sets()
         known = {**scenes, **data_sets}
-        if list_:
+        if list_ or name is None:
             width = max(map(len, known))
             for each, path in known.items():
                 show(f"{each:<{width}}  {'Data set: ' if each in data_sets else ''}{title_of(path)}")
+            if name is None:
+                note("ballpass new NAME copies one.")
             return
-        if name is None:
-            raise RequestError(f"new: no scene was named. Allowed: {', '.join(known)}. Their titles: --list.")
         source = known.get(name.replace("_", "-")) or {path.stem: path for path in known.values()}.get(name)
         if source is None:
             raise RequestError(f"new: {unknown_name('scene', name, known)}")

@@ -21,7 +21,7 @@ from ballpass.runtime.app.commands.shared import (
     load_model,
     note,
     results_folder,
-    show,
+    show_files,
     show_json,
     show_parts,
     size_words,
@@ -231,7 +231,12 @@ def run(
         turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
-        summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())
+        # nobody asked for the turns of a transient that ballpass chose: they are most of such a file
+        chosen = not model.manifest.run.stated and (cycles, duration, transient) == (None, None, None)
+        kept = solution.steady() if chosen else solution
+        summary, files = _write_results(
+            model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept
+        )
     if json_:
         show_json(summary)
         return
@@ -248,7 +253,7 @@ def run(
         show_parts(render_accuracy(model, solution.accuracy))
         show_parts(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
-    show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
+    show_files(folder, files, f" (solution.nc: {size})")
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
@@ -296,13 +301,21 @@ def _check_request(
 
 
 def _write_results(
-    model: Model, solution: Solution, summary: dict[str, Any], folder: Path, stages: Stages, *, formats: Sequence[str]
+    model: Model,
+    solution: Solution,
+    summary: dict[str, Any],
+    folder: Path,
+    stages: Stages,
+    *,
+    formats: Sequence[str],
+    stored: Solution,
 ) -> tuple[dict[str, Any], list[str]]:
     """Write solution, summary and figures in the place of those of an earlier run.
 
     Parameters
     ----------
     formats : of the figures; none are drawn without any
+    stored : samples of the file
 
     Returns
     -------
@@ -313,7 +326,7 @@ def _write_results(
     from ballpass.runtime.plot import NAMES as FIGURES
 
     def write(made: Path) -> dict[str, Any]:
-        solution.save(made / SOLUTION)
+        stored.save(made / SOLUTION)
         if formats:
             from ballpass.runtime.app.figure_run import run_for_figures
             from ballpass.runtime.plot.gallery import draw_all

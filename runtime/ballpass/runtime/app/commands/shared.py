@@ -11,6 +11,7 @@ import contextlib
 import math
 import os
 import sys
+import textwrap
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,6 +29,7 @@ from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import Report, ReportTable, Words
+from ballpass.runtime.report.text import WIDTH
 from ballpass.runtime.report.text import show as show_report
 from ballpass.runtime.show.progress import silent
 
@@ -122,22 +124,33 @@ def warn_of_scene(manifest: Manifest) -> None:
 
 def complain(message: str) -> None:
     """Print an error on stderr."""
-    errors_console.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
+    _say(f"[bold red]error[/]: {escape(message)}")
 
 
 def warn(message: Warning | str) -> None:
     """Print a warning on stderr."""
-    errors_console.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
+    _say(f"[bold yellow]warning[/]: {escape(str(message))}")
 
 
 def note(message: str) -> None:
     """Print a remark on stderr."""
-    errors_console.print(f"[bold]note[/]: {escape(message)}", soft_wrap=True, highlight=False)
+    _say(f"[bold]note[/]: {escape(message)}")
+
+
+def _say(marked: str) -> None:
+    """Print on stderr: on a terminal in lines broken between words, elsewhere a sentence is a line."""
+    errors_console.print(marked, soft_wrap=not errors_console.is_terminal, highlight=False)
 
 
 def show(text: str) -> None:
     """Print a line of results on stdout."""
     Console(emoji=False).print(text, highlight=False, soft_wrap=True, markup=False)
+
+
+def show_files(folder: Path, files: Sequence[str], more: str = "") -> None:
+    """Print the names of the files that were written, in lines of 80 columns at most where names allow it."""
+    words = f"results in {folder}: {', '.join(files)}{more}"
+    show(textwrap.fill(words, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
 
 
 def show_json(result: Any) -> None:

@@ -28,6 +28,7 @@ from ballpass.runtime.app.commands.shared import (
     note,
     results_folder,
     show,
+    show_files,
     show_json,
     show_parts,
     warn,
@@ -187,10 +188,8 @@ def sweep(
     else:
         table = swept.all_members() if count <= ROWS else swept.extremes()
         show_parts(table)
-        pictures = [name for name in files if name.startswith("sweep_")]
-        drawn, named = len(pictures), [name for name in files if name not in pictures]
-        named += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
-        show(f"{count} members, {len(result.failures)} without results. In {folder}: {', '.join(named)}")
+        show(f"{count} members, {len(result.failures)} without results.")
+        show_files(folder, files)
     for failure in result.failures[:NAMED]:
         warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
     if len(result.failures) > NAMED:

@@ -18,6 +18,7 @@ from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot import FORMATS
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
@@ -199,7 +200,7 @@ class Sweep:
         """A number with the digits that it has."""
         if not math.isfinite(value):
             return "-"
-        return f"~{value:z.2g}" if quantity in self.uncertain.get(member, ()) else f"{value:z.5g}"
+        return f"~{rounded(value, 2)}" if quantity in self.uncertain.get(member, ()) else rounded(value, 5)
 
     def all_members(self) -> ReportTable:
         """All members, each a row."""
