@@ -211,7 +211,7 @@ def test_a_command_without_an_option_that_it_needs_says_what_the_option_takes(
 ) -> None:
     done = ballpass("spectrum", SCENE)
     assert (done.exit_code, done.stderr.count("is missing")) == (2, 1)
-    assert "--of is missing. It takes: output or state of the scene with one value" in done.stderr
+    assert "--of is missing. It takes: output or state with one value: `inner.y`" in done.stderr
 
 
 def test_a_command_without_its_arguments_says_what_each_takes(ballpass: Callable[..., Result]) -> None:

@@ -16,6 +16,7 @@ from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.optimize import Limits
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.show.progress import Progress, shown
@@ -156,7 +157,7 @@ class SobolAnswer(ShortRepr, Reported):
         for one in self.quantities:
             factor, unit = table_unit(one.unit)
             numbers = (one.mean, one.deviation, *one.quantiles, one.least, one.most)
-            rows.append((one.name, *(f"{factor * number:.5g}" for number in numbers), unit))
+            rows.append((one.name, *(rounded(factor * number) for number in numbers), unit))
         right = ("mean", "deviation", "5 %", "50 %", "95 %", "least", "most")
         heads = ("quantity", *right, "unit")
         parts.append(ReportTable(title=f"{self.members} members", heads=heads, rows=rows, right=right))

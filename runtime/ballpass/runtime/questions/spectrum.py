@@ -54,7 +54,9 @@ SampleRate = Annotated[
 Of = Annotated[
     str,
     Option(
-        words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT", names=option_names.signals
+        words="Output or state with one value: `inner.y`, or `inner.ax` where `run.outputs` names it.",
+        shown="OUTPUT",
+        names=option_names.signals,
     ),
 ]
 Band = Annotated[

@@ -97,8 +97,8 @@ def on_request(name: object) -> str:
     if not any(fnmatchcase(str(name), pattern) for pattern in ON_REQUEST):
         return ""
     return (
-        f"{name!r} is computed only for a scene that names it: add it to run.outputs; the model is then derived anew. "
-        "Points, bodies and joints have the scene's names."
+        f"{name!r} is computed only for a scene that names it: write outputs = ['*', '{name}'] into [run], or add it "
+        "to those there; the model is then derived anew. Points, bodies and joints have the scene's names."
     )
 
 
