@@ -115,6 +115,16 @@ def test_extremes_of_samples_alone_are_marked_where_they_stand(make_model: Calla
         assert ("* of the samples alone" in str(table.caption)) == bool(mark)
 
 
+def test_all_rows_of_two_bearings_are_one_table_of_80_columns(make_model: Callable[..., Model]) -> None:
+    """A terminal prints what is wider in blocks: one block more held the units alone."""
+    model = make_model("rotor_two_bearings")
+    summary = summarize(model, model.simulate(cycles=2, transient=1))
+    text = table_text(render_summary(summary, model.manifest, every=True)[0])
+    assert max(map(len, text.splitlines())) <= 80
+    (row,) = (line for line in text.splitlines() if "Mass moved by the inner ring of pulley" in line)
+    assert "[kg]" in row or "[kg]" in text.splitlines()[text.splitlines().index(row) + 1]
+
+
 def test_a_scene_without_mechanism_has_no_reaction(make_model: Callable[..., Model]) -> None:
     model = make_model("varying_compliance")
     found = summarize(model, model.simulate(cycles=2, transient=1))

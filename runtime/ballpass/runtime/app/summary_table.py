@@ -79,10 +79,12 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
                 continue
             order = math.inf if place is None else float(place)
             words = row_words(manifest, row)
-            rows.append((order, (f"{words}\n  {row}" if every else words, *cells, unit)))
+            # beside names of two bearings a column of units has no room within 80
+            named = f"{words} [{unit}]\n  {row}" if unit else f"{words}\n  {row}"
+            rows.append((order, (named, *cells) if every else (words, *cells, unit)))
     rows.sort(key=lambda row: row[0])
     table = ReportTable(
-        heads=("", *columns, "unit"),
+        heads=("", *columns) if every else ("", *columns, "unit"),
         rows=[row for _, row in rows],
         right=columns,
         wrapped=("",),
