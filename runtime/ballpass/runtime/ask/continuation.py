@@ -174,9 +174,7 @@ def follow(
     return SteadyBranch(repeats=shooting.repeats, points=tuple(found), ended=ended)
 
 
-def doubled(
-    shooting: Shooting, at: BranchPoint, ends: tuple[float, float], *, points: int = POINTS // 4
-) -> SteadyBranch:
+def doubled(shooting: Shooting, at: BranchPoint, ends: tuple[float, float]) -> SteadyBranch:
     """Follow the branch of twice the period that begins at a period doubling.
 
     Raises
@@ -192,7 +190,7 @@ def doubled(
     flip = np.real(vectors[:, np.argmin(np.abs(values + 1.0))]) / shooting.magnitude
     tangent = np.append(flip / np.linalg.norm(flip), 0.0)
     twice = replace(shooting, repeats=2 * shooting.repeats)
-    return follow(twice, at, at.value, ends, tangent=tangent, points=points, half=shooting)
+    return follow(twice, at, at.value, ends, tangent=tangent, points=POINTS // 4, half=shooting)
 
 
 class _Path:

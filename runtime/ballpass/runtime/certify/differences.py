@@ -53,7 +53,6 @@ def richardson(
     at: float,
     scale: float,
     *,
-    steps: int = STEPS,
     resolution: float | Array = 0.0,
 ) -> Difference:
     """Derivative of a function of one number by extrapolated central differences.
@@ -63,21 +62,19 @@ def richardson(
     function : number to number or array of one shape; it should be as exact as possible: the step divides its noise
     at : the point
     scale : largest step; a length over which the function changes smoothly; a tenth of it gives the same accuracy
-    steps : number of steps, each half the one before
     resolution : error of the function's values besides rounding (an integrator's tolerance, say), in its unit
 
     Raises
     ------
     RequestError
-        A point or step that is no finite number, a step of zero or less, fewer than three steps.
+        A point or step that is no finite number, or a step of zero or less.
     """
-    if not (math.isfinite(at) and math.isfinite(scale) and scale > 0.0 and steps >= 3):
+    if not (math.isfinite(at) and math.isfinite(scale) and scale > 0.0):
         raise RequestError(
-            f"richardson: a finite point, a finite step above 0 and at least 3 steps are expected, not {at!r}, "
-            f"{scale!r} and {steps!r}."
+            f"richardson: a finite point and a finite step above 0 are expected, not {at!r} and {scale!r}."
         )
     upper, lower, width = [], [], []
-    for k in range(steps):
+    for k in range(STEPS):
         h = scale * 0.5**k
         above, below = at + h, at - h
         if above - below == 0.0:

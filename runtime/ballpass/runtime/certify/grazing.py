@@ -85,7 +85,6 @@ def find_grazing(
     angles: Array,
     *,
     one_sided: bool,
-    tolerance: float = TOLERANCE,
     bearing: str = "",
 ) -> tuple[Grazing, ...]:
     """Extremes of deflection near zero, and of its rate where the law is one-sided, in order of time.
@@ -97,7 +96,6 @@ def find_grazing(
     deflection : shape (n, balls) [m]
     angles : crank angle at each time, shape (n,) [rad]
     one_sided : whether the damping law has a kink at rate zero, in contact or not
-    tolerance : share of the largest deflection (rate) that counts as zero [1]
     bearing : name of the balls' bearing
     """
     found: list[Grazing] = []
@@ -107,10 +105,10 @@ def find_grazing(
         if len(rows) < 5:
             continue
         time, part = t[rows], deflection[rows]
-        found += _near_zero(time, part, angles[rows], "contact", tolerance * float(np.max(np.abs(deflection))), bearing)
+        found += _near_zero(time, part, angles[rows], "contact", TOLERANCE * float(np.max(np.abs(deflection))), bearing)
         if one_sided:
             rate = np.gradient(part, time, axis=0)
-            found += _near_zero(time, rate, angles[rows], "rate", tolerance * float(np.max(np.abs(rate))), bearing)
+            found += _near_zero(time, rate, angles[rows], "rate", TOLERANCE * float(np.max(np.abs(rate))), bearing)
     return tuple(sorted(found, key=lambda item: (item.time, item.kink, item.ball)))
 
 

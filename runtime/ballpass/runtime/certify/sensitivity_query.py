@@ -26,7 +26,7 @@ from ballpass.runtime.certify.certificate import (
     compare,
 )
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
-from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
+from ballpass.runtime.certify.grazing import Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import (
     STEPS,
@@ -295,9 +295,7 @@ def _jittered(run: Run) -> list[dict[str, float]]:
     return [{name: parameters[name] + move * scale for name, scale in scales.items()} for move in moves.tolist()]
 
 
-def _grazing(
-    model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities, tolerance: float = TOLERANCE
-) -> tuple[Grazing, ...]:
+def _grazing(model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
     # without a step the quantities need no motion
@@ -321,7 +319,6 @@ def _grazing(
             signals[name].value[order],
             angles,
             one_sided=bearing.damping.corner_at_rest,
-            tolerance=tolerance,
             bearing=bearing.name,
         )
     ]

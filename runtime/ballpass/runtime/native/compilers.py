@@ -90,7 +90,7 @@ def find_compiler(command: str | None = None) -> Compiler | None:
     return None
 
 
-def need_compiler(what: str, command: str | None = None) -> Compiler:
+def need_compiler(what: str) -> Compiler:
     """The compiler to use, as `find_compiler`.
 
     Parameters
@@ -102,7 +102,7 @@ def need_compiler(what: str, command: str | None = None) -> Compiler:
     RequestError
         There is none.
     """
-    found = find_compiler(command)
+    found = find_compiler()
     if found is None:
         raise RequestError(without_compiler(what))
     return found

@@ -32,9 +32,7 @@ PICTURES, RATE = 72, 12
 DPI = 90
 
 
-def write_movie(
-    frames: Frames, path: Path, *, dpi: int = DPI, progress: Callable[[float], None] = lambda done: None
-) -> Path:
+def write_movie(frames: Frames, path: Path, *, progress: Callable[[float], None] = lambda done: None) -> Path:
     """Write a movie whose kind is that of the file's ending, ``.gif`` or ``.mp4``.
 
     Raises
@@ -51,7 +49,7 @@ def write_movie(
         FigureCanvasAgg(figure)  # the writers draw with the figure's canvas
         made = Path(home) / path.name
         try:
-            with writer.saving(figure, str(made), dpi):
+            with writer.saving(figure, str(made), DPI):
                 for number, sample in enumerate(shown):
                     figure.clear()
                     _draw(figure, record, sample, shown, seen, turning=frames.turning)

@@ -12,13 +12,12 @@ from ballpass.runtime.contract import Manifest
 _BODY, _MASS = "mechanism.bodies.", ".mass"
 
 
-def limits_of_model(manifest: Manifest, values: Mapping[str, float], scene: str = "SCENE") -> Iterator[str]:
+def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator[str]:
     """Linkages that outweigh the ring of a bearing that is loaded one-way, and forces that begin at once.
 
     Parameters
     ----------
     values : parameters and derived constants by name
-    scene : what the command line calls it
     """
     mechanism = manifest.mechanism
     if mechanism is None:
@@ -39,7 +38,7 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float], scene: str 
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
                 f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "
-                f"so the faster it turns. `ballpass trade {scene} --against two-way` measures it."
+                "so the faster it turns. `ballpass trade SCENE --against two-way` measures it."
             )
     gates = {info.name for info in manifest.inputs if info.kind == "gate"}
     sudden = [name for name, _, _, item in mechanism.forces if item in gates]

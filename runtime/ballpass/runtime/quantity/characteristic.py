@@ -172,11 +172,6 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     return (first, *near[:MOST_NEAR])
 
 
-def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> str:
-    """What a line of a spectrum is: "3 BPFO", "BPFI - shaft", "" where nothing fits; arguments as of `names_of`."""
-    return next((name.words for name in names_of(frequency, lines, resolution)), "")
-
-
 def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
     """Turns of a spectrum that separates ball pass from the nearest multiple of the shaft; `TURNS` at least.
 

@@ -232,7 +232,6 @@ def stepper_magnitudes(
     duration: float,
     turn: float,
     begin: float = 0.0,
-    edges: np.ndarray | None = None,
 ) -> np.ndarray:
     """Magnitudes as the stepper finds them, shape (states,).
 
@@ -241,9 +240,8 @@ def stepper_magnitudes(
     stepper : one of the model's
     initial : state at the start, shape (states,)
     duration, turn, begin : of the run, of a turn, and time at the start [s]
-    edges : of the run's segments, where they are known [s]
     """
-    inputs, horizon = _moments(model, numbers, duration, turn, begin, edges)
+    inputs, horizon = _moments(model, numbers, duration, turn, begin)
     return stepper.magnitudes(numbers.p, numbers.c, initial, inputs, horizon)
 
 
@@ -295,12 +293,10 @@ def _moments(
     duration: float,
     turn: float,
     begin: float,
-    edges: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Inputs at the moments, shape (moments, inputs), and the time that bounds travel [s]."""
     horizon = min(duration, turn)
-    if edges is None:
-        edges = segment_edges(model, numbers, begin, begin + duration, turn)
+    edges = segment_edges(model, numbers, begin, begin + duration, turn)
     middles = 0.5 * (edges[:-1] + edges[1:])
     if len(middles) > MOMENTS:
         middles = middles[np.linspace(0, len(middles) - 1, MOMENTS).astype(int)]

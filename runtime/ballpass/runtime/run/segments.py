@@ -136,13 +136,12 @@ def _joined(parts: Sequence[Segments]) -> Segments:
     )
 
 
-def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:
+def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float) -> None:
     """Refuse a time with more segments than fit into memory: by their largest possible number, before any is made.
 
     Parameters
     ----------
     length, turn : of the time, and of a turn, infinite where nothing turns [s]
-    columns : numbers that a segment takes besides its inputs
 
     Raises
     ------
@@ -159,7 +158,7 @@ def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, tu
     check_memory(
         f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
         count,
-        len(inputs) + columns,
+        len(inputs) + WORK,
         "Take a shorter run, or slower loads; `Model.reduce` makes the segments of a few turns at a time.",
     )
 

@@ -37,14 +37,9 @@ def block(*parts: str) -> str:
     return f'<div class="ballpass"><style>{_STYLE}</style>{"".join(parts)}</div>'
 
 
-def framed_page(page: str, height: int = 720) -> str:
-    """A whole page with its own script, in a frame that shares nothing with the notebook.
-
-    Parameters
-    ----------
-    height : of the frame [pixels]
-    """
-    style = f"width: 100%; height: {height}px; border: 0;"
+def framed_page(page: str) -> str:
+    """A whole page with its own script, in a frame that shares nothing with the notebook."""
+    style = "width: 100%; height: 720px; border: 0;"
     return f'<iframe sandbox="allow-scripts" srcdoc="{escape(page)}" style="{style}"></iframe>'
 
 
