@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
-from ballpass.runtime.questions.fit import FitAnswer
+from ballpass.runtime.ask.fit_report import FitAnswer
 
 RATIO, CLEARANCE, HOUSING = "bearing.damping.ratio", "bearing.clearance", "bearing.outer_ring.stiffness"
 VARY = (f"{RATIO}=1e-6 s:1e-5 s:log", f"{CLEARANCE}=5 um:30 um", f"{HOUSING}=30 MN/m:80 MN/m")
