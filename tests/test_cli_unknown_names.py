@@ -105,11 +105,13 @@ def said(command: str, scene: Path, given: Mapping[str, str]) -> str:
     return " ".join(done.output.partition("error: ")[2].split())
 
 
-def in_python(model: Model, command: str, given: Mapping[str, str], name: str) -> str | None:
+def in_python(model: Model, command: str, given: Mapping[str, str]) -> str | None:
     """The message of the same request; None where it is for the command line alone."""
     calls: dict[str, Callable[[], Any]] = {
         "run": lambda: model.quantities(given["of"]),
-        "sweep": lambda: model.simulate_many({"bearing.clearance": [1e-6]}, given["of"]),
+        "sweep": lambda: model.simulate_many(
+            {"bearing.clearance": [1e-6]}, given.get("of", "rms:inner.y"), method=given.get("method")
+        ),
         "stream": lambda: model.stream("long.nc", sample_rate=1e3, outputs=[given["of"]]),
         "trade": lambda: measure_trade(model, [given["of"]]),
     }
@@ -132,13 +134,13 @@ def test_a_name_that_there_is_not_is_refused_before_c_is_generated_in_the_words_
     option: Option,
     text: str,
 ) -> None:
-    of_a_kind = text.startswith("mx:")
-    monkeypatch.setattr(generating, "_derive_and_lower", never if of_a_kind else lambda *_: derived)
+    alike_in_every_scene = text.startswith("mx:") or name == "method"
+    monkeypatch.setattr(generating, "_derive_and_lower", never if alike_in_every_scene else lambda *_: derived)
     monkeypatch.setattr(emitted, "write_folder", never)
     monkeypatch.setattr("ballpass.runtime.model.compile_model", never)
     given = {**NEEDED.get(command, {}), name: text}
     words = said(command, alone, given)
-    expected = in_python(model, command, given, name)
+    expected = in_python(model, command, given)
     assert expected is None or words == expected
     assert not (alone.parent / "generated").exists()
 
@@ -162,6 +164,19 @@ def test_numbers_of_a_scene_are_refused_as_it_is_read(
     done = CliRunner().invoke(app, [words[0], str(alone), *words[1:]])
     assert done.exit_code == 2, (done.output, done.exception)
     assert "bearing.clearance" in done.output
+
+
+def test_several_wrong_names_have_one_message_for_each_stage(
+    model: Model, alone: Path, derived: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(generating, "_derive_and_lower", lambda *_: derived)
+    monkeypatch.setattr(emitted, "write_folder", never)
+    for of, count in (("mx:inner.y", 1), ("max:inner.q", 2)):
+        given = {"of": of, "wrt": "bearing.clearanc"}
+        expected = in_python(model, "sensitivity", given)
+        assert expected is not None
+        assert said("sensitivity", alone, given) == expected
+        assert expected.count("There is no") == count
 
 
 @pytest.mark.parametrize("text", UNKNOWN["Q"])

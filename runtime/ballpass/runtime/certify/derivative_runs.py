@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ballpass.runtime.certify.growth import refuse_growth
-from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.choose_method import STIFF_RATIO
+from ballpass.runtime.run.choose_method import STIFF_RATIO, differentiating_method
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
@@ -38,12 +37,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
     RequestError
         A wrong request, or a method that does not differentiate its own steps.
     """
-    asked = request.method or "auto"
-    if asked not in ("auto", *STEPPERS):
-        raise RequestError(
-            f"sensitivity: the method {asked!r} was given; allowed are auto, {', '.join(STEPPERS)}, which "
-            "differentiate their own steps."
-        )
+    asked = differentiating_method("sensitivity", request.method or "auto")
     fine = "stepper-dop853"
     if model.states:
         turn = driver_angle.period(model.manifest, numbers.values)

@@ -205,8 +205,6 @@ TightRtol = Annotated[float | None, _tolerance("Tolerance of the states; tight i
 
 SensitivityRtol = Annotated[float | None, _tolerance("Tolerance of the derivatives; tight if not given.")]
 
-StepperMethod = Annotated[str | None, Option(words="`auto`, or one of the stepper's.", shown="NAME")]
-
 Check = Annotated[
     bool, Option(words="Compare each derivative with extrapolated differences.", flags=("--check/--no-check",))
 ]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ballpass.runtime.contract.options import Cycles, Rtol, StepperMethod, Transient
+from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
+from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.show.progress import Progress, shown
 
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     from ballpass.runtime.contract import BearingInfo
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.point.run_start import Initial
+
+StepperMethod = Annotated[
+    str | None,
+    Option(words="`auto`, or one of the stepper's.", shown="NAME", names=option_names.stepper_methods),
+]
 
 #: Clearances of the figure of life, and steady turns of each.
 POINTS, TURNS = 17, 64

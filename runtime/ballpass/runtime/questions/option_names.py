@@ -120,3 +120,19 @@ def bearings(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
     if manifest is not None:
         for text in texts:
             bearing_named(manifest, text)
+
+
+def stepper_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
+    """Methods of the project's own stepper, of which every scene has the same."""
+    from ballpass.runtime.run.choose_method import stepper_method
+
+    for text in texts:
+        stepper_method(text)
+
+
+def differentiating_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
+    """Methods that differentiate their own steps."""
+    from ballpass.runtime.run.choose_method import differentiating_method
+
+    for text in texts:
+        differentiating_method("sensitivity", text)

@@ -76,6 +76,7 @@ class Question:
             values.apply_defaults()
             refuse_faults(options_of(ask), values.arguments)
             self.refuse(values.arguments)
+            refuse_unknown(options_of(ask), values.arguments)  # first, as the command line must
             refuse_unknown(options_of(ask), values.arguments, next(iter(values.arguments.values())).manifest)
             return call(*given, **named)
 

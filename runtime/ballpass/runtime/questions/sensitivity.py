@@ -43,7 +43,14 @@ Wrt = Annotated[
         names=option_names.parameters,
     ),
 ]
-Method = Annotated[str, Option(words="Of the derivatives: `auto`, or a stepper's name.", shown="NAME")]
+Method = Annotated[
+    str,
+    Option(
+        words="Of the derivatives: `auto`, or a stepper's name.",
+        shown="NAME",
+        names=option_names.differentiating_methods,
+    ),
+]
 
 
 def _figures(_model: Any, report: SensitivityReport, _parameters: Any) -> Iterator[tuple[str, Figure]]:

@@ -38,6 +38,26 @@ def stepper_method(asked: str) -> str:
     return asked
 
 
+def differentiating_method(what: str, asked: str) -> str:
+    """Name of a method that differentiates its own steps, or auto.
+
+    Parameters
+    ----------
+    what : asks for it, for messages
+
+    Raises
+    ------
+    RequestError
+        Another method.
+    """
+    if asked not in ("auto", *STEPPERS):
+        raise RequestError(
+            f"{what}: the method {asked!r} was given; allowed are auto, {', '.join(STEPPERS)}, which differentiate "
+            "their own steps."
+        )
+    return asked
+
+
 def method_names(model: LoadedModel) -> tuple[str, ...]:
     """Integration methods of a model, besides ``auto``."""
     return (*(STEPPERS if model.has_stepper else ()), *(METHODS if model.has("rhs") else ()))

@@ -13,9 +13,9 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.choose_method import differentiating_method
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import jumping_laws, kinks_with_derivatives, refuse_jumps
 from ballpass.runtime.run.request import Request, tolerance
@@ -88,12 +88,7 @@ def sensitivities(
         refuse_jumps(model.manifest, "sensitivities")
     elif jumping_laws(model.manifest):
         request = replace(request, method=EXPLICIT)
-    method = request.method or model.manifest.run.method
-    if method not in ("auto", *STEPPERS):
-        raise RequestError(
-            f"sensitivities: the method {method!r} was given; allowed are auto, {', '.join(STEPPERS)}, which "
-            "differentiate their own steps."
-        )
+    differentiating_method("sensitivities", request.method or model.manifest.run.method)
     if not names:
         raise RequestError("sensitivities: no parameter was named. Give the names of one or more parameters.")
     made: list[Directions] = []

@@ -53,6 +53,11 @@ Of = Annotated[
     ),
 ]
 
+Method = Annotated[
+    str | None,
+    Option(words="auto, or a stepper's name as in ballpass run.", shown="NAME", names=option_names.stepper_methods),
+]
+
 #: Most members that the terminal shows one by one; of more only the extremes.
 ROWS = 24
 
@@ -79,9 +84,7 @@ def sweep(
     duration: Duration = None,
     transient: Transient = None,
     rtol: Rtol = None,
-    method: Annotated[
-        str | None, typer.Option(metavar="NAME", help="auto, or a stepper's name as in ballpass run.")
-    ] = None,
+    method: Method = None,
     kinks: Annotated[
         str | None,
         typer.Option(
