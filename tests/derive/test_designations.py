@@ -68,6 +68,15 @@ def catalogue(name: str, maker: str) -> CatalogueRating | None:
     return next((rating for rating in TYPES[name].catalogues if rating.maker == maker), None)
 
 
+def test_a_misspelt_key_that_a_designation_supplies_too_is_found() -> None:
+    """Without its right name the file would get the value of the table, and the remedy was to delete the line."""
+    with pytest.raises(SceneError) as caught:
+        read(edited(named("6204"), "clearance = ", "clearence = "))
+    (fault,) = caught.value.faults
+    assert fault.key == "bearing.clearence"
+    assert 'did you mean "clearance"' in fault.remedy
+
+
 def test_table_has_the_common_series() -> None:
     expected = [f"{series}{bore:02d}" for series in (60, 62, 63) for bore in range(17)]
     assert set(expected) <= set(TYPES)

@@ -132,6 +132,7 @@ class Table:
         self.path = path
         self.missing = data is None
         self.data: dict[str, Any] = data or {}
+        self._written = frozenset(self.data)  # a designation adds others
         self._known: list[str] = []
 
     def __enter__(self) -> Table:
@@ -142,7 +143,7 @@ class Table:
     ) -> None:
         if kind is not None:
             return
-        absent = [key for key in self._known if key not in self.data]
+        absent = [key for key in self._known if key not in self._written]
         unknown = [key for key in self.data if key not in self._known]
         misspelt = {key: get_close_matches(key, absent, n=1, cutoff=MISSPELT) for key in unknown}
         # a table decides which other keys belong beside it: of these nothing is known where it is misspelt

@@ -185,7 +185,7 @@ def bifurcation(
     rtol: Rtol = None,
     progress: Progress = None,
 ) -> Bifurcation:
-    """Tell periodic from chaotic motion over a parameter, upwards and downwards.
+    """Separate periodic from chaotic motion over a parameter, upwards and downwards.
 
     Each value begins where the motion at the value before ended, so that motions that exist side by side show as a
     difference between up and down. States are read once in a period of the equations, or once a turn where that is
