@@ -80,6 +80,9 @@ def test_changes_are_those_of_single_runs(make_model: Callable[..., Model], tmp_
     assert found.change[PEAK] < -0.1  # the paper's model is too low
     assert ("times as fast" in found.words) == (found.gain >= 1.0)  # which, depends on the machine's other work
     assert np.shape(rows(found)[1]) == (2, 6)
+    speeds = next(row for row in rows(found)[1] if row[0] == "rms:inner.vy")
+    assert (speeds[1], float(speeds[2])) == ("mm/s", pytest.approx(1e3 * found.values["rms:inner.vy"], rel=1e-3))
+    assert found.meanings["rms:inner.vy"].startswith("Velocity of the centre of the inner ring along y")
     assert to_plain(found)["simplification"]["units"] == {PEAK: "N", "rms:inner.vy": "m/s"}
     # life is counted in turns, of a variant whose outputs do not name the ball force as well
     variant = load(generate(read_scene(SCENES / "punching_press.toml", coupling="two-way"), tmp_path / "variant"))

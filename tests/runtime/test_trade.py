@@ -95,6 +95,8 @@ def test_the_table_and_the_figure_show_every_way_of_the_front(trade: Trade, tmp_
     assert shown >= {"stepper", "stepper, kinks located", "best of all"}
     save(figure, tmp_path / "trade.png")
     assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
+    text = " ".join(str(trade).split())
+    assert all(f"{name}: {trade.meanings[name]}" in text for name in trade.quantities)
 
 
 def test_errors_are_written_as_people_read_them() -> None:

@@ -22,6 +22,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.quantity.grammar import quantity_words
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.request import Request
@@ -36,7 +37,7 @@ class Simplification:
     ----------
     title, simpler_title : of both scenes
     quantities : what is compared
-    units : of the quantities, by name
+    units, meanings : of the quantities, by name
     values, simpler_values : of the quantities, medians over the members, in SI
     change : relative change by the simpler model, median over the members [1]
     error : 95 % point of its size [1]
@@ -52,6 +53,7 @@ class Simplification:
     simpler_title: str
     quantities: tuple[str, ...]
     units: Mapping[str, str]
+    meanings: Mapping[str, str]
     values: Mapping[str, float]
     simpler_values: Mapping[str, float]
     change: Mapping[str, float]
@@ -176,6 +178,7 @@ def measure_simplification(
         simpler_title=simpler.manifest.title,
         quantities=names,
         units={item.name: item.unit for item in compared[0]},
+        meanings={item.name: quantity_words(model.manifest, item) for item in compared[0]},
         values=by_name(both[0]),
         simpler_values=by_name(both[1]),
         change=by_name(np.median(changes, axis=0)),

@@ -24,6 +24,7 @@ from ballpass.runtime.contract.method_registry import AUTO, CHOICE, METHODS, STE
 from ballpass.runtime.contract.tableaus import RosenbrockTableau
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.quantity.grammar import quantity_words
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run.locating import LOCATED, has_kinks
 from ballpass.runtime.run.request import Request
@@ -167,6 +168,7 @@ def measure_trade(
         spread=spread,
         cycles=turns,
         measured=tuple(_summary(way, errors[k], times[k], known, names) for k, way in enumerate(ways)),
+        meanings={item.name: quantity_words(model.manifest, item) for item in compared},
     )
 
 

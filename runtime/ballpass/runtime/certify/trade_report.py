@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.report.report import Report, ReportTable
@@ -50,6 +50,7 @@ class Trade(Reported):
     ----------
     scene, title : of the scene
     quantities : what errors are measured of
+    meanings : of the quantities, by name
     values : of the quantities, medians over the members, in SI
     uncertainty : relative, of the reference: 95 % point of the difference of two methods [1]
     members : parameter sets
@@ -67,6 +68,7 @@ class Trade(Reported):
     spread: float
     cycles: float
     measured: tuple[Measured, ...]
+    meanings: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (
@@ -86,7 +88,12 @@ class Trade(Reported):
             rows=rows,
             right=heads[:-1],
             wrapped=heads[-1:],
-            caption=f"{self.members} members of {self.cycles:g} cycles",
+            caption="\n".join(
+                [
+                    f"{self.members} members of {self.cycles:g} cycles",
+                    *(f"{name}: {words}" for name, words in self.meanings.items()),
+                ]
+            ),
         )
         records = [
             {**asdict(one.way), "time": one.time, "failures": one.failures, "error": self.error(one), **one.promised}

@@ -53,7 +53,8 @@ def _report(found: Trade | Simplification) -> Report:
         return found.report()
     heads, lines = rows(found)
     title = f"{found.title}; other: {found.simpler_title}"
-    table = ReportTable(title=title, heads=heads, rows=lines, right=heads[2:])
+    meanings = "\n".join(f"{name}: {words}" for name, words in found.meanings.items())
+    table = ReportTable(title=title, heads=heads, rows=lines, right=heads[2:], caption=meanings)
     return Report(parts=(table, found.words), facts=to_plain(found))
 
 
