@@ -68,7 +68,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def _quick_compiler(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Half of the suite's time would go into gcc -O3: without the long tests, which run what users run, -Og does."""
     real = shutil.which("cc")
-    quick = request.config.option.markexpr == "not long" or SHARED in os.environ
+    quick = request.config.option.markexpr == "not long and not extreme" or SHARED in os.environ
     if real is None or "CC" in os.environ or not quick:
         yield
         return

@@ -118,6 +118,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return generate(ROOT / "scenes" / "rotor.toml", tmp_path_factory.mktemp("generated") / "rotor")
 
 
+@pytest.mark.long
 def test_a_generated_folder_runs_where_derive_sympy_pint_and_figures_are_missing(folder: Path, tmp_path: Path) -> None:
     # without a compiler, which takes longer; tests/test_package.py does it as users do and compares the motion
     missing = "ballpass.derive,sympy,pint,matplotlib,scipy,xarray,pandas,ziglang"

@@ -26,6 +26,7 @@ def scene(site: Path) -> None:
     (site / f"{NAME}.toml").write_text(short, encoding="utf-8")
 
 
+@pytest.mark.long
 def test_a_trade_prints_what_an_error_costs_and_leaves_figures(ballpass: Callable[..., Result], site: Path) -> None:
     done = ballpass("trade", f"{NAME}.toml", "--members", "3")
     assert done.exit_code == 0, done.output
@@ -51,6 +52,7 @@ def test_a_trade_is_one_json_object_and_follows_its_settings(ballpass: Callable[
     assert not (site / "lighter").exists()
 
 
+@pytest.mark.long
 def test_run_and_sweep_take_any_quantity_and_refuse_in_the_same_words(ballpass: Callable[..., Result]) -> None:
     """And at the same options as the summary's own peak; a name that is none is refused alike."""
     of = ("peak_ball_force", "kurtosis:inner.y", "value:inner.y@240deg", "peak_time:ball.force")

@@ -6,9 +6,12 @@ force or dyad needs a case here, and `test_every_part.py` says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from quick_cases import long_but
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.elements import ELEMENTS
@@ -350,4 +353,18 @@ def _dyads() -> list[Part]:
     ]
 
 
+#: One of each kind of force, drive, effect, law, dyad and contact, which the quick tests take; the long ones take all.
+QUICK = (
+    *("damping law one-sided", "damping law tangent", "damping law hunt-crossley"),
+    *("rolling element cylindrical-roller", "rolling element ball at a contact angle"),
+    *("effect ball_waviness", "effect defects", "drive table", "drive asynchronous"),
+    *("force forces PointForce Windows", "force forces PointForce AngleTable", "force springs TwoPoints SpringDamper"),
+    *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR"),
+)
 PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads())
+
+
+def cases(parts: Iterable[Part] = PARTS) -> list[Any]:
+    """Parameters of a test: those of `QUICK`, and the others with the mark `long`."""
+    parts = list(parts)
+    return long_but(parts, *(str(part) for part in parts if str(part) in QUICK))

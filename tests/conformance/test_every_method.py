@@ -146,7 +146,10 @@ def free_figures(tableau: Tableau) -> Row:
     return tuple(row[-1] for row in tableau.dense_rows) if isinstance(tableau, RosenbrockTableau) else ()
 
 
-@every_method
+@pytest.mark.parametrize(
+    "tableau",
+    [pytest.param(t, id=t.name, marks=pytest.mark.long if t.name == "DOP853" else ()) for t in TABLEAUS.values()],
+)
 def test_any_changed_figure_is_found(tableau):
     claims = CLAIMS[tableau.name]
     found = 0

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import pytest
 from evaluators import Evaluators, Point
-from parts import PARTS, REGISTERED, ROOT, Part
+from parts import PARTS, QUICK, REGISTERED, ROOT, Part, cases
 
 from ballpass.derive import equations
 from ballpass.derive.features import count_operations, features, operations_of
@@ -34,17 +34,18 @@ def evaluators_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], E
     return cache(lambda text: Evaluators(scene_of(text), tmp_path_factory.mktemp("part")))
 
 
-@pytest.fixture(params=PARTS, ids=str)
+@pytest.fixture(params=cases(), ids=str)
 def evaluators(request: pytest.FixtureRequest, evaluators_of: Callable[[str], Evaluators]) -> Evaluators:
     return evaluators_of(request.param.text)
 
 
 @pytest.mark.parametrize("registry", REGISTERED)
 def test_every_entry_of_a_registry_has_a_case(registry: str) -> None:
-    cases = {part.name for part in PARTS if part.registry == registry}
-    missing, gone = REGISTERED[registry] - cases, cases - REGISTERED[registry]
+    found = {part.name for part in PARTS if part.registry == registry}
+    missing, gone = REGISTERED[registry] - found, found - REGISTERED[registry]
     assert not missing, f"tests/conformance/parts.py has no scene with the {registry} {', '.join(sorted(missing))}"
     assert not gone, f"tests/conformance/parts.py has a scene for {', '.join(sorted(gone))}, which is no {registry}"
+    assert any(name.startswith(registry) for name in QUICK), f"QUICK of tests/conformance/parts.py has no {registry}"
 
 
 def close(found: np.ndarray, expected: np.ndarray, rtol: float) -> None:
@@ -112,7 +113,7 @@ def test_derivatives_agree_with_differences(evaluators: Evaluators) -> None:
         assert off(total[:, k], "p", k, 1e-6 * max(abs(point.p[k]), 1e-7)) < 3e-5, parameter.name
 
 
-@pytest.mark.parametrize("part", [part for part in PARTS if part.without], ids=str)
+@pytest.mark.parametrize("part", cases(part for part in PARTS if part.without), ids=str)
 def test_nothing_is_left_of_it_where_its_numbers_are_zero(
     part: Part, evaluators_of: Callable[[str], Evaluators]
 ) -> None:
@@ -144,7 +145,7 @@ def results(one: Evaluators, of: Evaluators, point: Point, changes: Mapping[str,
     return np.concatenate([one.value(name, there).ravel() for name in ("rhs", "outputs")])
 
 
-@pytest.mark.parametrize("part", [part for part in PARTS if part.path], ids=str)
+@pytest.mark.parametrize("part", cases(part for part in PARTS if part.path), ids=str)
 def test_a_scene_pays_for_it_only_where_it_names_it(part: Part, evaluators_of: Callable[[str], Evaluators]) -> None:
     """Its features list it; left out in memory it costs what a scene file costs that never named it."""
     scene = scene_of(part.text)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from parts import DAMPING, ROOT, press, shipped
+from quick_cases import long_but
 
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.bearing.laws import LAWS
@@ -130,7 +131,7 @@ def test_ungated_one_sided_balls_are_an_isotropic_dashpot_of_twice_c_b() -> None
 # smoothness
 
 
-@every_law
+@pytest.mark.parametrize("law", long_but(LAWS, "none", "one-sided", "hunt-crossley"))
 def test_the_docs_and_the_manifest_say_how_smooth_it_is(law: str) -> None:
     """As its row in the page on damping has it; it jumps where its formula does; smoothed it is twice smooth."""
     page = (ROOT / "docs/theory/damping.md").read_text(encoding="utf-8")

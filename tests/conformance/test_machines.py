@@ -15,7 +15,8 @@ from comparison import drawn, largest_difference, largest_imbalance, power_imbal
 from coupled_scenes import POWERS, RUN, Derived, linkage_text
 from linkages import MACHINES
 from multibody import Multibody
-from parts import PARTS, TORQUES, Part, shaper
+from parts import PARTS, TORQUES, Part, cases, shaper
+from quick_cases import long_but
 
 from ballpass.derive.drive.laws import LAWS as DRIVES
 from ballpass.derive.mechanism.dyads import DYADS
@@ -60,7 +61,7 @@ def test_every_dyad_and_each_of_its_branches_is_in_a_machine() -> None:
     assert not missing, f"MACHINES of tests/machines/linkages.py has no machine with {missing}"
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", long_but(MACHINES, "four-bar", "crank-slider", "slotted lever", "six-bar with slider"))
 def test_linkages_move_and_react_as_in_absolute_coordinates(name: str) -> None:
     """At constant speed, where the drive's torque is a reaction; and turning freely."""
     machine = MACHINES[name]()
@@ -75,7 +76,7 @@ def test_linkages_move_and_react_as_in_absolute_coordinates(name: str) -> None:
         check(*pair, states(*pair, 3))
 
 
-@pytest.mark.parametrize("part", [part for part in PARTS if part.registry == "force"], ids=str)
+@pytest.mark.parametrize("part", cases(part for part in PARTS if part.registry == "force"), ids=str)
 def test_forces_act_as_between_points_in_absolute_coordinates(part: Part) -> None:
     """Where it acts, and where a stop, window or table leaves the machine alone."""
     derived, machine = freely(part.text)
@@ -87,7 +88,7 @@ def test_forces_act_as_between_points_in_absolute_coordinates(part: Part) -> Non
     check(derived, machine, [*acting[:4], *idling[:1]])
 
 
-@pytest.mark.parametrize("law", DRIVES)
+@pytest.mark.parametrize("law", long_but(DRIVES, "table", "asynchronous"))
 def test_torques_of_drives_turn_the_machine(law: str) -> None:
     """With a flywheel on the driven body."""
     torque = f'[mechanism.driver.torque]\nlaw = "{law}"\n{TORQUES[law]}\n'

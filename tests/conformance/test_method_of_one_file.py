@@ -76,6 +76,7 @@ def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_a_method_put_beside_the_others_runs_everywhere(make_model: Callable[..., Model], beside: Path) -> None:
     folder = make_model("varying_compliance").folder
     given = [sys.executable, "-W", "ignore", "-c", RUN, str(beside), str(folder)]

@@ -38,6 +38,7 @@ def test_every_feature_adds_operations_where_it_acts_and_none_where_it_does_not(
             assert added["kernel.stage"] > 0
 
 
+@pytest.mark.long
 def test_parts_are_counted_whose_outputs_nobody_could_ask_for_without_them(scene_text: Callable[..., str]) -> None:
     """Outputs on request of linkage, gravity and damping, and a pattern of two parts."""
     outputs = ("point.slider.C.ay", "weight.power", "contact.loss", "*.power")
@@ -65,6 +66,7 @@ def test_a_ball_more_costs_nothing_in_the_steppers_text() -> None:
     assert few == many
 
 
+@pytest.mark.long
 def test_features_of_one_scene_change_no_byte_of_another(tmp_path: Path) -> None:
     """Nothing is remembered from scene to scene: a plain scene generated behind a rich one is the same plain scene."""
     plain, rich = ROOT / "scenes/varying_compliance.toml", ROOT / "scenes/offset_slider.toml"
@@ -118,6 +120,7 @@ RATE = ('ratio = "0.25e-5 s*mm^0.5"\n', 'ratio = "0.25e-5 s*mm^0.5"\nsmoothing =
 GRAVITY = "[mechanism]\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("path", "change", "others"),
     [

@@ -23,6 +23,7 @@ from linkages import (
     six_bar_slider,
     watt_six_bar,
 )
+from quick_cases import long_but
 
 from ballpass.derive.mechanism.kinematics import dot
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
@@ -33,7 +34,9 @@ from ballpass.derive.scene.records import Joint, Mechanism
 TURN = np.linspace(0.0, 2 * np.pi, 61)
 STEP = 1e-30  # of complex differentiation: no difference is taken, so no digits are lost
 
-every_machine = pytest.mark.parametrize("name", list(MACHINES))
+every_machine = pytest.mark.parametrize(
+    "name", long_but(MACHINES, "four-bar", "crank-slider", "slotted lever", "watt six-bar", "guide on a moving body")
+)
 
 
 @cache

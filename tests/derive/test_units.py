@@ -204,6 +204,7 @@ def test_sizes_kept_here_are_those_of_pint() -> None:
         assert looked_up_size(name) == size
 
 
+@pytest.mark.long
 def test_scenes_are_read_without_pint() -> None:
     code = (
         "import sys; from pathlib import Path; from ballpass.derive import read_scene\n"

@@ -13,6 +13,7 @@ from benchmarks.__main__ import main
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.long
 def test_page_of_the_benchmarks_is_drawn_from_its_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(ROOT / "benchmarks" / "results", tmp_path / "results")
     assert main(["--draw", "--out", str(tmp_path)]) == 0

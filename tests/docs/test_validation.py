@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scripts.validation import cage_lag, classifier, lines, load_zone, spall_lines
+from scripts.validation import cage_lag, lines, load_zone, spall_lines
 
 from ballpass.runtime.ask.vibration import diagnosis
 
@@ -68,6 +68,8 @@ def test_the_contact_angle_of_outer_spalls_gives_the_lines_of_inner_ones() -> No
 
 def test_lines_of_a_spall_stand_higher_than_those_of_the_other_ring() -> None:
     """In every second of the files that were chosen; BPFO against BPFI, without a classifier."""
+    from scripts.validation import classifier  # imports scikit-learn
+
     seconds = [one for one in classifier.measured(None) if one.file in (*range(105, 109), *range(130, 134))]
     assert len(seconds) == 80
     for one in seconds:

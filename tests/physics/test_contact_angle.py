@@ -33,6 +33,7 @@ def pushed(make_model: Callable[..., Model]) -> Model:
     return make_model("rotor", ('designation = "6204"', displaced), OUTPUTS)
 
 
+@pytest.mark.long
 def test_zero_contact_angle_gives_the_bits_of_none(make_model: Callable[..., Model], angled: Model) -> None:
     plain = make_model("rotor", OUTPUTS)
     runs = [model.simulate(cycles=1, transient=0) for model in (plain, angled)]

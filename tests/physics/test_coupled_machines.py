@@ -19,6 +19,7 @@ from coupled_scenes import (
     with_bearings,
 )
 from multibody import Multibody
+from quick_cases import long_but
 from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.optimize import root
 
@@ -125,13 +126,7 @@ def pair(name: str) -> tuple[Derived, Multibody]:
     return derived, Multibody(derived.scene, derived.points())
 
 
-#: Second cases of what another one has as well; their systems are large.
-SECOND = ("press, effects", "press, effects, run-up", "press, effects, outer ring on the crank", "drag link")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in SECOND else ()) for name in CASES]
-)
+@pytest.mark.parametrize("name", long_but(CASES, "two-way press", "Whitworth"))
 def test_accelerations_and_reactions_are_those_of_absolute_coordinates_with_multipliers(name: str) -> None:
     """Reactions and the drive's torque come out of the balances of the bodies, forces of the balls and housings out of
     deflections, a motor's torque out of its law: that both are equal is a free check."""
@@ -160,7 +155,7 @@ def test_a_run_up_loads_one_way_bearings_with_the_reaction_of_the_accelerated_li
     assert len(set(loads)) == 4
 
 
-@pytest.mark.parametrize("ground", [150.0, 50.0])
+@pytest.mark.parametrize("ground", [150.0, pytest.param(50.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("left", "refused"), [(0.009, True), (0.011, False)])
 def test_play_that_lets_a_linkage_reach_a_dead_centre_is_refused(ground: float, left: float, refused: bool) -> None:
     """Coupler 100 mm and rocker 80 mm in one line with the crank of 30 mm, but for what is left.
@@ -180,6 +175,7 @@ def test_play_that_lets_a_linkage_reach_a_dead_centre_is_refused(ground: float, 
         derive(scene)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["press, bearings in all hinges", pytest.param("drag link", marks=pytest.mark.long), "Whitworth"]
 )
@@ -254,7 +250,7 @@ def stiffer(machine: Multibody, decades: int) -> dict[str, float]:
     ("name", "joints", "time"),
     [
         ("punching_press", (("A", ""), ("B", "crank"), ("C", "slider")), 0.05),
-        ("four_bar", FOUR_BAR_JOINTS, 0.033),
+        pytest.param("four_bar", FOUR_BAR_JOINTS, 0.033, marks=pytest.mark.long),
     ],
 )
 def test_carried_by_stiff_contacts_a_linkage_has_the_reactions_of_ideal_joints(

@@ -218,6 +218,7 @@ def static_forces(angle: float) -> np.ndarray:
     return of(found)
 
 
+@pytest.mark.long
 def test_life_of_a_constant_load_by_hand(rotor: Model) -> None:
     """A slowly turning rotor: exponents 4, 4.5 and the Weibull slope 9/8 over static loads; L_10 with 10/3."""
     speed = 1.0  # [rad/s]: quasi-static, the rotor's own motion is damped away
@@ -271,6 +272,7 @@ def own_run(
     return np.asarray(found.y.T)
 
 
+@pytest.mark.long
 def test_varying_compliance_is_that_of_an_own_model(rotor: Model) -> None:
     """Motion of the rotor over a roller pass against SciPy, 1e-8 of the motion."""
     run = rotor.simulate(cycles=0.2, transient=0, rtol=1e-12, samples_per_cycle=400)
@@ -377,6 +379,7 @@ def test_sensitivities_of_the_press_whose_rollers_meet_and_part_are_verified(mak
     assert all(pair.check.verdict is Verdict.VERIFIED for pair in report.pairs)
 
 
+@pytest.mark.long
 def test_exponent_of_a_ball_gives_its_bits(
     make_model: Callable[..., Model], scene_text: Callable[..., str], tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

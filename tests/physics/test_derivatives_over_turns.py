@@ -146,6 +146,7 @@ def test_derivatives_of_states_are_those_of_differences_in_every_turn(
         assert best < AGREEMENT, name
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::ballpass.runtime.KinkWarning")
 @pytest.mark.parametrize(
     ("case", "turns"),

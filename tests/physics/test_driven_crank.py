@@ -80,6 +80,7 @@ def test_andrews_squeezer_comes_to_the_published_end(andrews: Model) -> None:
         assert float(end[name][-1]) == pytest.approx(value, abs=1e-7), name
 
 
+@pytest.mark.long
 def test_kinetic_energy_of_a_slider_crank_and_its_sensitivities_are_those_of_idas(tmp_path: Path) -> None:
     """G, dG/dk and dG/dc of SUNDIALS' example idasSlCrank_FSA_dns, by the project's own forward sensitivities."""
     path = tmp_path / "slider_crank.toml"
@@ -217,7 +218,7 @@ def test_members_of_an_ensemble_end_their_steps_on_the_edges_of_windows_as_singl
 EDGES = ["mechanism.forces.punch.window.start", "mechanism.forces.punch.window.end"]
 
 
-@pytest.mark.parametrize("method", ["stepper-dop853", "stepper-rodas5p"])
+@pytest.mark.parametrize("method", [pytest.param("stepper-dop853", marks=pytest.mark.long), "stepper-rodas5p"])
 def test_derivatives_across_windows_of_a_driven_crank_are_those_of_differences(press: Model, method: str) -> None:
     """Through two windows.  The driver gets to an edge earlier or later, and the derivative jumps there."""
     names = [*EDGES, PUNCH, WHEEL, TORQUE, "mechanism.driver.speed", "mechanism.driver.start_angle"]

@@ -74,6 +74,7 @@ def test_powers_of_all_forces_are_the_change_of_the_kinetic_energy(text: str) ->
         assert power_imbalance(derived, machine, *drawn(rng, derived, machine)) < 1e-10
 
 
+@pytest.mark.long
 def test_a_heavy_ring_in_a_light_linkage_feels_effects_as_one_coupled_one_way_does() -> None:
     """The same state, with effects and without: what they change of the rings' accelerations."""
     one_way = (SCENES / "punching_press.toml").read_text(encoding="utf-8").partition("[bearing]")
@@ -240,6 +241,7 @@ HELD = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("outer", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_an_outer_ring_that_turns_carries_its_waves_and_spalls_with_it(
     make_virtual: Callable[..., Model], outer: bool

@@ -71,6 +71,7 @@ def test_depth_and_rebound_are_those_of_the_first_integral(model: Model) -> None
     assert run["inner.vx"][-1] == pytest.approx(-rebound(FACTOR), rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_derivative_of_the_rebound_is_that_of_the_first_integral(model: Model) -> None:
     step = 1e-5
     slope = -(rebound(FACTOR + step) - rebound(FACTOR - step)) / (2 * step)
@@ -79,6 +80,7 @@ def test_the_derivative_of_the_rebound_is_that_of_the_first_integral(model: Mode
     assert found.x[-1, column, 0] == pytest.approx(slope, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_smoothed_contact_keeps_the_law(tmp_path: Path) -> None:
     """The first integral holds for any elastic force; a smoothed onset stores 3e-7 of the energy at first."""
     law = f'hysteresis = "{FACTOR} s/m"\n[bearing.contact]\nstiffness = "{STIFFNESS} N/m^1.5"\nsmoothing = "0.05 um"'

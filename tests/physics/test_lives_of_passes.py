@@ -124,6 +124,7 @@ def halves(slow: float, fast: float, half: float) -> dict[str, float]:
     return numbers(time, speed, np.zeros(ROWS), load)
 
 
+@pytest.mark.long
 def test_damage_counts_turns_and_not_seconds(press: Model) -> None:
     """3 kN where it turns slowly, or fast: 25 798 and 2866 h with a rating of 12 793 N, where seconds say 5117 h."""
     hours = []

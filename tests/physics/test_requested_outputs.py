@@ -111,7 +111,7 @@ def along_motion(model: Derived, t: float, x: np.ndarray, h: float = 2e-6) -> tu
     return at[0], {name: (8 * (at[1][name] - at[-1][name]) - at[2][name] + at[-2][name]) / (12 * h) for name in at[0]}
 
 
-@pytest.mark.parametrize("which", ["one-way", "two-way", "torque"])
+@pytest.mark.parametrize("which", ["one-way", "two-way", pytest.param("torque", marks=pytest.mark.long)])
 def test_velocities_and_accelerations_are_the_time_derivatives(which: str) -> None:
     """Of every point and body, whatever drives the machine: exact, the accelerations of all coordinates included."""
     model, checked = machine(which), 0
@@ -145,7 +145,7 @@ def test_acceleration_of_the_slider_is_that_of_the_textbook() -> None:
         assert found["body.rod.speed"] ** 2 + 0.0 == pytest.approx((w * l1 * s / root) ** 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("which", ["one-way", "two-way", "angled", "torque"])
+@pytest.mark.parametrize("which", ["one-way", "two-way", "angled", pytest.param("torque", marks=pytest.mark.long)])
 def test_the_balance_of_every_joule_closes(which: str) -> None:
     """The kinetic energy changes by the sum of all named powers, with everything on that takes or gives work."""
     model = machine(which)
@@ -297,7 +297,10 @@ def test_static_rating_of_iso_76_is_where_the_pressure_is_4200_mpa() -> None:
     assert contact(load)["ball.inner_pressure"] == pytest.approx(4200e6, rel=3e-3)
 
 
-@pytest.mark.parametrize("which", ["one-way", "two-way", "torque"])
+@pytest.mark.parametrize(
+    "which",
+    [pytest.param("one-way", marks=pytest.mark.long), "two-way", pytest.param("torque", marks=pytest.mark.long)],
+)
 def test_the_runtime_knows_what_is_on_request(which: str) -> None:
     """It can say how to get an output that the manifest does not know, and says it of no other."""
     model = machine(which)

@@ -102,6 +102,7 @@ def test_work_of_the_drive_is_what_bodies_flywheel_and_weight_take(press: Model)
         assert energy[-1] - energy[0] == pytest.approx(work, rel=1e-8, abs=1e-8)
 
 
+@pytest.mark.long
 def test_derivatives_by_rows_of_the_table_are_those_of_the_integral(press: Model) -> None:
     """Times and speeds; the ends of segments move with the times."""
     found = press.sensitivities(NAMES, duration=END, rtol=1e-9, parameters={PUNCH: 0.0}).x[-1]

@@ -36,6 +36,7 @@ def test_work_of_the_engine_is_the_area_of_its_indicator_diagram(make_model: Cal
     assert 3000 < indicated * 30 < 5000  # W at 3600 rpm: engines of 196 cm^3 have about 4 kW
 
 
+@pytest.mark.long
 def test_bearings_of_the_shaft_carry_their_shares_of_weight_belt_and_unbalance(
     make_model: Callable[..., Model],
 ) -> None:

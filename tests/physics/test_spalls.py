@@ -108,7 +108,7 @@ def test_a_ball_sinks_as_deep_by_its_own_spall(spalled: Model) -> None:
         assert sunk(spalled, 3, (middle + turned) / spin, OF_6204) == 0.0
 
 
-@pytest.mark.parametrize("slip", [0.0, 0.04])
+@pytest.mark.parametrize("slip", [0.0, pytest.param(0.04, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("spall", "factor", "radius"),
     [

@@ -78,6 +78,7 @@ def along_turn(model: Model, of: str) -> np.ndarray:
     return np.array([quantity_values(model, numbers, of, t=a / speed, x=None)[0] for a in TURN])
 
 
+@pytest.mark.long
 def test_a_cubic_stiffness_hardens_a_spring_and_what_it_stores_comes_back(
     make_model: Callable[..., Model], bare: Model
 ) -> None:

@@ -77,6 +77,7 @@ def test_an_output_more_does_not_ask_for_a_length_of_the_run(run: str, turns: tu
     assert scene.run.at_rest == ("transient" not in run)
 
 
+@pytest.mark.long
 def test_rings_at_rest_do_not_fall_through_their_clearance(plain: Model, tmp_path: Path) -> None:
     steady = plain.reduce()["ball.force"].maximum
     assert plain.reduce().duration == pytest.approx(10 * plain.period())
@@ -160,6 +161,7 @@ COMMANDS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [COMMANDS[0], *(pytest.param(c, marks=pytest.mark.long) for c in COMMANDS[1:])])
 def test_commands_warn_of_an_extreme_in_its_first_turns(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

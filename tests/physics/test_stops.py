@@ -83,6 +83,7 @@ def test_hysteresis_takes_the_energy_of_hunt_and_crossley(wheel: Model) -> None:
     assert run["total_energy"][0] - run["total_energy"][-1] == pytest.approx(taken, rel=1e-7)
 
 
+@pytest.mark.long
 def test_derivatives_of_a_bounce_are_those_of_its_closed_form(wheel: Model) -> None:
     """Behind the bounce the angle is 2 up - v (t - contact); steps over the kink have no digit of its derivatives."""
     speed = {"mechanism.driver.speed": SPEED}

@@ -271,6 +271,7 @@ def read_or_refused(text: str, name: str = "mutant") -> Scene | SceneError:
     return scene
 
 
+@pytest.mark.long
 @given(name=st.sampled_from(NAMES), data=st.data())
 @examples(100, 5000)
 def test_a_mutated_scene_is_read_or_refused_in_words(name: str, data: st.DataObject) -> None:
@@ -298,6 +299,7 @@ def test_a_mutated_scene_is_read_or_refused_in_words(name: str, data: st.DataObj
     read_or_refused("\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [NAMES[0], *(pytest.param(name, marks=pytest.mark.long) for name in NAMES[1:])])
 def test_an_empty_text_is_refused_wherever_a_scene_has_one(name: str) -> None:
     """Empty was taken for a text that is missing and reported: 34 of 428 such scenes ended in StopIteration."""
@@ -442,6 +444,7 @@ def rotor_model(rotor: Path) -> Callable[[str], Path]:
 WORDS = ("int", "clean", *(("main", "run", "NULL", "all", "Makefile", "stepper", "casadi_real") if LONG else ()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", WORDS)
 def test_words_of_c_and_make_are_names_like_others(word: str, tmp_path: Path) -> None:
     text = PRESS

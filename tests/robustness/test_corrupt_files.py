@@ -315,6 +315,7 @@ def test_a_damaged_library_never_ends_a_process(cache: Path, rotor: Path, tmp_pa
     assert bytes.fromhex(done.stdout.strip()) == expected.tobytes()
 
 
+@pytest.mark.long
 def test_a_cache_emptied_while_it_is_used_is_no_trouble(cache: Path, rotor: Path) -> None:
     """Functions are looked up when they are first called, the stepper is compiled when it is first asked for."""
     expected = load(rotor).simulate(cycles=0.2, method="cvodes").x

@@ -171,7 +171,7 @@ def test_count_of_derivatives_is_what_they_take(press: Model, monkeypatch: pytes
         few.tangents(trajectory.segments, 0, 1)
 
 
-@pytest.mark.parametrize("count", [16, pytest.param(41, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [pytest.param(16, marks=pytest.mark.long), pytest.param(41, marks=pytest.mark.long)])
 def test_count_of_nodes_is_what_a_quantity_takes(press: Model, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     names = list(press.parameters)[:count]
     quantities = QuantityRun(press, [parse_quantity(press.manifest, "mean:inner.y")], along_nodes=True)

@@ -237,6 +237,7 @@ def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_pat
     assert compiling.compile_sources((tmp_path / "twice.c",), compiler).path.exists()
 
 
+@pytest.mark.long
 def test_a_killed_process_leaves_the_old_solution_or_the_new_one(rotor: Path, tmp_path: Path) -> None:
     code = """
         import itertools, sys
@@ -393,6 +394,7 @@ def test_an_interrupt_that_python_turns_into_something_else_is_one(where: str, c
     assert found.stderr == ("error: interrupted. Files written so far are complete.\n" if code else "")
 
 
+@pytest.mark.long
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     cache: Path, scene: Path, tmp_path: Path
 ) -> None:
@@ -517,6 +519,7 @@ def test_a_command_that_is_none_is_a_wrong_request(rotor: Path, command: str) ->
         load(rotor, compiler=command)
 
 
+@pytest.mark.long
 def test_without_any_program_on_the_path_the_model_runs_in_the_virtual_machine(scene: Path, tmp_path: Path) -> None:
     words = ("run", scene, "--cycles", "2", "--transient", "1", "--json", "--no-figures")
     env = {"PATH": str(tmp_path / "nothing"), "CC": "", "PYTHONPATH": str(tmp_path)}
@@ -638,6 +641,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [
@@ -703,6 +707,7 @@ def test_no_folder_at_all_to_compile_in_is_refused_in_words(
         compiling.compile_sources((source,), compiler)
 
 
+@pytest.mark.long
 def test_a_relative_cache_folder_is_found_from_wherever_the_process_goes(
     rotor: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -739,6 +744,7 @@ def with_clearance(folder: Path, micrometres: int) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_scene_of_the_same_name_written_between_deriving_and_loading_is_not_taken_for_ones_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -208,6 +208,7 @@ def test_links_and_permissions_of_a_folder_stay(tmp_path: Path, runs: tuple[Path
     assert target.stat().st_mode & 0o777 == 0o750
 
 
+@pytest.mark.long
 def test_a_reader_beside_a_writer_gets_one_run(
     tmp_path: Path, runs: tuple[Path, Path], solutions: list[Solution]
 ) -> None:
@@ -228,6 +229,7 @@ def test_a_reader_beside_a_writer_gets_one_run(
             process.kill()
 
 
+@pytest.mark.long
 def test_two_processes_that_write_one_folder_take_turns(tmp_path: Path, runs: tuple[Path, Path]) -> None:
     """Each took files of the other for those of a killed process, and one ended in FileNotFoundError."""
     target = tmp_path / "rotor"

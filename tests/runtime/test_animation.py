@@ -197,6 +197,7 @@ def test_no_request_leaves_the_page_whatever_stands_in_it(press: tuple[Model, So
         assert browse(page, "", tmp_path / name)[2] == expected
 
 
+@pytest.mark.long
 def test_words_of_a_scene_end_no_element(make_virtual: Callable[..., Model]) -> None:
     model = make_virtual("punching_press", ('title = "Punching machine of the paper"', 'title = "</script><b>&"'))
     text = animation_page(model, model.simulate(cycles=1, transient=0))
@@ -204,6 +205,7 @@ def test_words_of_a_scene_end_no_element(make_virtual: Callable[..., Model]) -> 
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
 
 
+@pytest.mark.long
 def test_a_movie_and_a_page_begin_with_the_bearing_that_is_named(
     make_virtual: Callable[..., Model], scene_text: Callable[..., str], tmp_path: Path
 ) -> None:
@@ -236,6 +238,7 @@ def test_gif_has_as_many_pictures_as_asked_for(press: tuple[Model, Solution], tm
     assert np.any(pictures[1] != pictures[2])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stopped", [False, True])
 def test_a_failing_ffmpeg_is_told_and_an_interrupt_stays_one(
     press: tuple[Model, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stopped: bool

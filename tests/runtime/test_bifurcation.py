@@ -16,6 +16,7 @@ THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 RPM = math.tau / 60.0
 
 
+@pytest.mark.long
 def test_the_exponent_of_a_periodic_motion_is_the_logarithm_of_its_largest_multiplier(rotor: Model) -> None:
     found = rotor.bifurcation("shaft.speed=380 rpm:393.1540342298 rpm:2", readings=120, settling=20)
     multiplier = abs(rotor.steady().multipliers[0])

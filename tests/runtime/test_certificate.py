@@ -60,6 +60,7 @@ def test_a_verdict_says_when_it_rests_on_the_quantum_alone(
     assert (found.bounded, found.is_nothing(derivative)) == (bounded, nothing)
 
 
+@pytest.mark.long
 def test_an_effect_of_the_start_that_has_died_out_is_called_nothing(make_model: Callable[..., Model]) -> None:
     """Damping takes the start away like exp(-t/0.2 s): no digit of its derivative 2.7 s later is known, and no report
     may look as if one was."""

@@ -125,6 +125,7 @@ def test_samples_are_those_of_single_runs_and_truth_is_what_they_were_run_with(r
             assert np.array_equal(run[name], found[name][member])
 
 
+@pytest.mark.long
 def test_noise_is_white_and_of_the_stated_ratio(rotor: Model, tmp_path: Path) -> None:
     long = replace(SIGNALS, duration=0.4, precision="float64")
     ratios = uniform(-10.0, 30.0)
@@ -181,7 +182,17 @@ def test_second_call_goes_on_where_the_first_one_ended(
         make_data_set(tmp_path, classes(rotor), noisy, seed=1)
 
 
-@pytest.mark.parametrize("name", ["inner.x/1.0", "noise_rms/0.0", "noise_rms/2.0", "status/1", "time/0", "label/0"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "inner.x/1.0",
+        pytest.param("noise_rms/0.0", marks=pytest.mark.long),
+        pytest.param("noise_rms/2.0", marks=pytest.mark.long),
+        "status/1",
+        pytest.param("time/0", marks=pytest.mark.long),
+        pytest.param("label/0", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("cut", [True, False])
 def test_what_was_deleted_or_cut_is_made_again(rotor: Model, tmp_path: Path, name: str, cut: bool) -> None:
     """A set with a deleted chunk was complete, with NaN for samples; cut noise ended in a traceback."""
@@ -214,6 +225,7 @@ def test_a_set_that_fits_nowhere_is_refused_and_leaves_nothing(rotor: Model, tmp
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_netcdf_holds_what_zarr_holds(rotor: Model, tmp_path: Path) -> None:
     for name in ("a.zarr", "a.nc"):
         make_data_set(tmp_path / name, classes(rotor), SIGNALS, seed=1, chunk=4)

@@ -58,7 +58,9 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
     return all(np.array_equal(a[name][rows], b[name], equal_nan=True) for name in b)
 
 
-@pytest.mark.parametrize("law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long), "tangent"])
+@pytest.mark.parametrize(
+    "law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long), pytest.param("tangent", marks=pytest.mark.long)]
+)
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str) -> None:
     """Of ``auto``, stepped over; by one method, lanes are the bits of single runs (conformance/test_lanes.py)."""
     model, columns = press(make_model, law), table(11)
@@ -88,7 +90,14 @@ def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, 
         assert force.maximum_ball == result["peak_ball:ball.force"][k]
 
 
-@pytest.mark.parametrize(("law", "rtol"), [("stiff", 1e-3), ("stiff", 1e-6), ("one-sided", 1e-3)])
+@pytest.mark.parametrize(
+    ("law", "rtol"),
+    [
+        pytest.param("stiff", 1e-3, marks=pytest.mark.long),
+        pytest.param("stiff", 1e-6, marks=pytest.mark.long),
+        ("one-sided", 1e-3),
+    ],
+)
 def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, rtol: float) -> None:
     """Lanes change their family where single runs do, as often, and their step sizes agree."""
     model, columns = press(make_model, law), table(8)
@@ -124,6 +133,7 @@ def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMake
         assert located["end:inner.vx"][k] == single.end["inner.vx"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
 def test_members_at_tight_tolerances_are_single_runs(make_model: ModelMaker, rtol: float) -> None:
     """Tangent damping is steep where contact begins: lanes lose hundreds of tolerances there."""
@@ -149,6 +159,7 @@ def test_members_at_loose_tolerances_advance_in_lanes(make_model: ModelMaker, rt
     assert (found.statistics.kinks, found.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
 
 
+@pytest.mark.long
 def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker) -> None:
     model = make_model("varying_compliance", ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n'))
     columns = {"bearing.clearance": [5e-6, 1e-5]}
@@ -166,7 +177,7 @@ def test_results_are_the_same_bits_for_any_number_of_threads(make_model: ModelMa
     assert same(results[0], results[2])
 
 
-@pytest.mark.parametrize("law", ["one-sided", "stiff"])
+@pytest.mark.parametrize("law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long)])
 def test_a_member_does_not_depend_on_its_neighbours(make_model: ModelMaker, law: str) -> None:
     model, columns = press(make_model, law), table(40)
     whole = model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0.5)
@@ -457,6 +468,7 @@ def test_segments_made_for_many_are_those_made_for_one(make_model: ModelMaker, t
     assert_segments_of_one(model, members, Span(durations=turns * length, turns=length, starts=transient * length))
 
 
+@pytest.mark.long
 def test_segments_of_fast_loads_on_slow_shafts_are_those_made_for_one(make_model: ModelMaker) -> None:
     """Where a phase gets large within a turn, the turn is cut."""
     wave = (

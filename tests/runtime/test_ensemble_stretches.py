@@ -51,7 +51,9 @@ def cut(whole: MemberArrays, cuts: list[list[int]]) -> list[MemberArrays]:
     return found
 
 
-@pytest.mark.parametrize("law", ["one-sided", "stiff", "tangent"])
+@pytest.mark.parametrize(
+    "law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long), pytest.param("tangent", marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p"])
 def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker, law: str, method: str) -> None:
     """States, reductions, counts, methods and step sizes are the same bits; members are cut each at its own places."""
@@ -195,8 +197,10 @@ def test_a_member_has_its_own_limit_of_steps(
     assert fates[0] == fates[1]
 
 
-@pytest.mark.parametrize("lanes", [True, False])
-@pytest.mark.parametrize(("members", "cycles"), [(8, 200), (200, 8)], ids=["few long", "many short"])
+@pytest.mark.parametrize("lanes", [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("members", "cycles"), [pytest.param(8, 200, marks=pytest.mark.long), (200, 8)], ids=["few long", "many short"]
+)
 def test_progress_is_told_within_chunks(
     make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, lanes: bool, members: int, cycles: int
 ) -> None:
@@ -242,6 +246,7 @@ def test_members_interrupted_between_stretches_have_no_results(make_model: Model
     assert np.all(np.isnan(found["max:ball.force"]))
 
 
+@pytest.mark.long
 def test_the_end_of_a_stretch_is_not_that_of_the_run(make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked to stop when all have come to the end of their first stretch: only who needs no other one has results."""
     model = press(make_model)

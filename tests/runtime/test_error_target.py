@@ -140,6 +140,7 @@ def test_of_chaos_targets_are_met_that_moved_starts_keep_and_others_refused_with
             assert np.max(np.abs(np.array(moved) / found.values[asked[0].name] - 1.0)) <= target
 
 
+@pytest.mark.long
 def test_what_is_added_is_a_few_runs(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
     """The chosen run, a tighter one, and one of both from a moved start."""
     runs: list[MethodChoice] = []
@@ -200,6 +201,7 @@ def test_smaller_errors_take_tighter_tolerances_until_none_is_left(make_model: C
     assert refused.value.best.estimate > 1e-8
 
 
+@pytest.mark.long
 def test_a_stiff_model_and_a_slow_turn_do_not_crawl(make_model: Callable[..., Model]) -> None:
     """Dampers a thousand times as strong, and a quarter of a million oscillations in a turn: steps are few."""
     stiff = make_model("punching_press", ('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "0.25e-5 s*m^0.5"'))

@@ -90,6 +90,7 @@ def test_damping_of_the_two_presses_is_told_apart(make_model: Callable[..., Mode
     assert dict(one_sided.smoothness)["damping"] == "kinked"
 
 
+@pytest.mark.long
 def test_command_names_the_line_that_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     scene = ROOT / "scenes/punching_press.toml"

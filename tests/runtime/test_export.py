@@ -33,8 +33,8 @@ from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
 SHORT, LONG = (
-    ("punching_press", "varying_compliance"),
-    ("punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
+    ("punching_press",),
+    ("varying_compliance", "punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
 )
 MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
@@ -133,7 +133,7 @@ def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:
     ("scene", "changes", "rtol"),
     [
         ("punching_press", (), "1e-6"),
-        (
+        pytest.param(
             "varying_compliance",
             (
                 ('law = "none"', 'law = "two-sided-gated"\ncoefficient = "4000 N*s/m"'),
@@ -141,10 +141,11 @@ def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:
                 ("transient_cycles = 20 ", "transient_cycles = 1 "),
             ),
             "1e-5",
+            marks=pytest.mark.long,
         ),
         pytest.param("punching_press_tangent", (), "1e-8", marks=pytest.mark.long),
         pytest.param("four_bar", (), "1e-7", marks=[pytest.mark.long, pytest.mark.extreme]),
-        ("varying_compliance", (), "1e-9"),
+        pytest.param("varying_compliance", (), "1e-9", marks=pytest.mark.long),
     ],
 )
 def test_program_locates_kinks_as_the_model_does(
@@ -206,7 +207,7 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
         ("four_bar", {"mechanism.torques.work.window.start": 5.6, "mechanism.torques.work.window.end": 0.9}),
         ("four_bar", {"mechanism.driver.speed": -55.0, "mechanism.driver.start_angle": 2.5}),
         # edges shared by both windows, at the start and at whole turns
-        (
+        pytest.param(
             "offset_slider",
             {
                 "mechanism.forces.tool.window.start": 0.0,
@@ -214,9 +215,14 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
                 "mechanism.forces.strip.window.start": 4.0,
                 "mechanism.forces.strip.window.end": 6.283185307179586,
             },
+            marks=pytest.mark.long,
         ),
         # a window without width, and a clearance that changes the derived constants' neighbours
-        ("offset_slider", {"mechanism.forces.tool.window.end": 4.014257279586958, "bearing.clearance": 4e-6}),
+        pytest.param(
+            "offset_slider",
+            {"mechanism.forces.tool.window.end": 4.014257279586958, "bearing.clearance": 4e-6},
+            marks=pytest.mark.long,
+        ),
         ("punching_press", {"bearing.ball_diameter": 7.5e-3, "bearing.contact.young_modulus": 310e9}),
     ],
 )
@@ -326,9 +332,16 @@ HARMONIC = (
             marks=pytest.mark.long,
         ),
         ("four_bar", (), {"mechanism.driver.speed": 300.0}),
-        ("offset_slider", (), {"bearing.clearance": 60e-6}),
-        ("varying_compliance", (), {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3}),
-        ("varying_compliance", HARMONIC, {"load.amplitude.x": 2000.0, "shaft.speed": 400.0}),
+        pytest.param("offset_slider", (), {"bearing.clearance": 60e-6}, marks=pytest.mark.long),
+        pytest.param(
+            "varying_compliance",
+            (),
+            {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3},
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "varying_compliance", HARMONIC, {"load.amplitude.x": 2000.0, "shaft.speed": 400.0}, marks=pytest.mark.long
+        ),
     ],
 )
 @pytest.mark.parametrize(
@@ -367,10 +380,12 @@ def test_tolerances_follow_the_sizes_of_the_run_at_hand_as_in_python(
     ("scene", "changes", "numbers", "length"),
     [
         ("four_bar", (), {}, 3.7),
-        ("offset_slider", (), {"mechanism.driver.speed": -40.0}, 2.0),
+        pytest.param("offset_slider", (), {"mechanism.driver.speed": -40.0}, 2.0, marks=pytest.mark.long),
         # a fast load on a slow shaft, and on one that stands: segments end before a phase gets large
         ("varying_compliance", HARMONIC, {"shaft.speed": 0.01, "load.frequency": 3.3e6}, 700.0),
-        ("varying_compliance", HARMONIC, {"shaft.speed": 0.0, "load.frequency": 3.3e6}, 50.0),
+        pytest.param(
+            "varying_compliance", HARMONIC, {"shaft.speed": 0.0, "load.frequency": 3.3e6}, 50.0, marks=pytest.mark.long
+        ),
     ],
 )
 def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(

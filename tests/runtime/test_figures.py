@@ -80,6 +80,7 @@ def texts(figure: Figure) -> str:
     return " ".join([*written, caption_of(figure)]).replace("\n", " ").replace("\u00a0", " ")
 
 
+@pytest.mark.long
 def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp_path: Path) -> None:
     first = draw_all(*press, tmp_path / "a")
     assert [path.name for path in first] == [*(f"{name}.png" for name in NAMES), CAPTIONS]
@@ -96,7 +97,7 @@ def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp
             assert b"tIME" not in data
 
 
-@pytest.mark.parametrize(("kind", "head"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
+@pytest.mark.parametrize(("kind", "head"), [("svg", b"<?xml"), pytest.param("pdf", b"%PDF", marks=pytest.mark.long)])
 def test_vector_figures_are_the_same_bytes_each_time(press: Run, tmp_path: Path, kind: str, head: bytes) -> None:
     files = [save(draw("load_curve", *press), tmp_path / f"{name}.{kind}").read_bytes() for name in "ab"]
     assert files[0] == files[1]
@@ -125,6 +126,7 @@ def test_dollars_in_a_scene_s_title_are_no_formula(put: Callable[[Figure, str, s
     assert save(figure, tmp_path / "a.png").is_file()
 
 
+@pytest.mark.long
 def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:
     assert [path.stem for path in draw_all(*shaft, tmp_path)][:-1] == [*NAMES[1:]]
 
@@ -149,6 +151,7 @@ def test_every_bearing_gets_its_figures(
         assert figure.get_suptitle().splitlines()[1] == "bearing b"
 
 
+@pytest.mark.long
 def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run, tmp_path: Path) -> None:
     assert [path.stem for path in draw_all(*linkage_alone, tmp_path)][:-1] == ["load_curve", "peak_moment"]
     figure = draw("load_curve", *linkage_alone)
@@ -163,7 +166,10 @@ def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("scene", ["press", "shaft", "linkage_alone"])
+@pytest.mark.parametrize(
+    "scene",
+    ["press", pytest.param("shaft", marks=pytest.mark.long), pytest.param("linkage_alone", marks=pytest.mark.long)],
+)
 def test_nothing_is_cut_and_axes_have_units(name: str, scene: str, request: pytest.FixtureRequest) -> None:
     run: Run = request.getfixturevalue(scene)
     record = gather(*run)
@@ -342,7 +348,11 @@ def test_applied_force_is_drawn_where_it_acts_and_while_it_acts(press: Run) -> N
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ('force = { magnitude = "50 N", direction = "120 deg" }', (-25.0, 25.0 * np.sqrt(3.0))),
+        pytest.param(
+            'force = { magnitude = "50 N", direction = "120 deg" }',
+            (-25.0, 25.0 * np.sqrt(3.0)),
+            marks=pytest.mark.long,
+        ),
         ('force = ["3 N", "-4 N"]', (3.0, -4.0)),
     ],
 )
@@ -356,6 +366,7 @@ def test_applied_force_has_the_components_of_the_scene(
     assert force == pytest.approx(expected)
 
 
+@pytest.mark.long
 def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Callable[..., Model]) -> None:
     """On a lug of the slider, and as the table falls from 1000 N at 0 to -1000 N at 180 degrees, to the other side."""
     table = 'table = { angle = ["0 deg", "180 deg"], force = ["1000 N", "-1000 N"] }\ndirection = "30 deg"'
@@ -447,6 +458,7 @@ def test_a_motor_s_torque_turns_around_its_joint_and_the_punch_acts_in_its_windo
     assert senses == {-1.0, 1.0}
 
 
+@pytest.mark.long
 def test_a_load_curve_covers_all_turns_of_a_force_s_table(make_model: Callable[..., Model]) -> None:
     """A four-stroke engine fires in one turn of two: the last turn alone may show the other one."""
     model = make_model("engine")
@@ -459,6 +471,7 @@ def test_a_load_curve_covers_all_turns_of_a_force_s_table(make_model: Callable[.
         assert 90.0 < angle[np.argmin(force)] < 120.0  # behind top dead centre with ignition
 
 
+@pytest.mark.long
 def test_a_body_is_drawn_around_its_points_and_its_centre_and_coupler_points_are_named(
     make_model: Callable[..., Model],
 ) -> None:

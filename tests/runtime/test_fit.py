@@ -87,6 +87,7 @@ def test_a_product_is_reported_as_one_number(make_model: Callable[..., Model]) -
     assert abs(found.numbers[2].value - 7e-6) < 4.0 * found.numbers[2].deviation < 1e-6
 
 
+@pytest.mark.long
 def test_what_a_signal_does_not_depend_on_is_not_given_as_a_number(press: Model) -> None:
     """The crank's inertia acts nowhere at constant speed."""
     times = np.arange(300) / 5e3
@@ -120,6 +121,7 @@ def test_other_values_that_fit_as_well_are_named(make_model: Callable[..., Model
     assert "Other values fit as well" in found.report().warnings[0]
 
 
+@pytest.mark.long
 def test_several_trials_with_numbers_of_their_own_from_files(make_model: Callable[..., Model], tmp_path: Path) -> None:
     """Two speeds, in a CSV file in micrometres and milliseconds, and in a NetCDF file; wrong samples in one of them."""
     import xarray
@@ -154,6 +156,7 @@ def test_accelerations_are_data_too(make_model: Callable[..., Model]) -> None:
     assert abs(found.numbers[0].value - 7e-6) < 3.0 * found.numbers[0].deviation < 1e-6
 
 
+@pytest.mark.long
 def test_a_spectrum_is_data_as_amplitudes_over_the_frequency(make_model: Callable[..., Model], tmp_path: Path) -> None:
     """Amplitudes of a discrete Fourier transform, by a second method, over whole turns; gain of the sensor unknown."""
     rotor, turns, count = make_model("rotor"), 4, 2048
@@ -175,6 +178,7 @@ def test_a_spectrum_is_data_as_amplitudes_over_the_frequency(make_model: Callabl
     assert found.signals[0].axis == "frequency"
 
 
+@pytest.mark.long
 def test_lines_peaks_and_means_are_data_with_their_deviations(make_model: Callable[..., Model], tmp_path: Path) -> None:
     """Four numbers read off instruments at each of two speeds, in a table with units."""
     rotor, names = make_model("rotor"), ["amplitude:inner.y@1x", "amplitude:inner.x@1x", "rms:inner.y", "mean:inner.y"]
@@ -204,6 +208,7 @@ def test_lines_peaks_and_means_are_data_with_their_deviations(make_model: Callab
         rotor.fit({"rms:inner.y": 1e-6}, vary, progress=False, **length)
 
 
+@pytest.mark.long
 def test_filtered_noise_is_warned_of(press: Model) -> None:
     data = _data(press, {CLEARANCE: 13.7e-6}, "outer.y", 0.0, 1, np.arange(500) / 5e3)
     random = np.convolve(np.random.default_rng(1).standard_normal(502), np.ones(3), "valid")
@@ -212,6 +217,7 @@ def test_filtered_noise_is_warned_of(press: Model) -> None:
     assert "too narrow" in report.warnings[0]
 
 
+@pytest.mark.long
 def test_a_chaotic_motion_is_refused(press: Model) -> None:
     data = _data(press, {CLEARANCE: 100e-6}, "outer.y", 0.02, 1, np.arange(1800) / 5e3)
     with pytest.raises(SimulationError, match="chaotic"):

@@ -48,8 +48,8 @@ def loaded_state(model: Model, t: float) -> np.ndarray:
     ("scene", "changes", "t"),
     [
         ("punching_press_tangent", (), 0.0811),
-        ("four_bar", (), 0.0153),
-        ("varying_compliance", TABLE_LOAD, 0.0137),
+        pytest.param("four_bar", (), 0.0153, marks=pytest.mark.long),
+        pytest.param("varying_compliance", TABLE_LOAD, 0.0137, marks=pytest.mark.long),
     ],
     ids=["press", "four_bar", "table_load"],
 )
@@ -200,6 +200,7 @@ def test_compiled_blocks_are_those_of_the_virtual_machine(press: Model) -> None:
         assert compiled == pytest.approx(virtual, rel=1e-12, abs=1e-12 * float(np.max(np.abs(virtual))))
 
 
+@pytest.mark.long
 def test_a_run_compiles_no_jacobians(
     make_model: Callable[..., Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_cases import long_but
 from scipy.integrate import solve_ivp
 from stepper_methods import FAMILY_ORDERS, NAMES
 from stepper_runs import segments_between
@@ -137,6 +138,7 @@ def test_located_kinks_restore_the_order_of_the_method(preloaded: Model, family:
     assert last[0] < 0.02 * last[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("family", "longest"), [("dp54", 16e-6), ("dop853", 24e-6)])
 def test_a_step_behind_an_onset_has_its_order_in_the_root_of_time(tangent: Model, family: str, longest: float) -> None:
     """A step of h from there is off by h^((p + 1) / 2) or less; stepped over it is off by h^(3/2), whatever its order.
@@ -184,6 +186,7 @@ def test_a_step_that_looks_for_the_end_of_a_contact_stays_within_its_run(hertz: 
         assert (outcome.time, outcome.kinks) == (end, 0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["hertz", "tangent"])
 def test_contacts_cost_a_few_steps_and_not_a_cascade(request: pytest.FixtureRequest, law: str) -> None:
     """A ring bounces on turning balls.  At a tight tolerance steps of its own clock enter and leave each contact.
@@ -239,6 +242,7 @@ VARIED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "scene",
     [
@@ -310,6 +314,7 @@ FELL = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("scene", "rtol", "parameters"), FELL)
 def test_steps_foreseen_or_left_over_do_not_vanish(
     make_model: Make, scene: str, rtol: float, parameters: dict[str, float]
@@ -382,7 +387,7 @@ def bounce(
     return x, met
 
 
-@pytest.mark.parametrize("method", NAMES)
+@pytest.mark.parametrize("method", long_but(NAMES, "stepper-rodas4"))
 def test_a_force_that_jumps_agrees_with_events_of_scipy(gated: Model, method: str) -> None:
     """A ring falls through its clearance and bounces on turning balls, whose damping begins and ends with a jump.
 
@@ -453,6 +458,7 @@ def test_balls_that_meet_their_raceway_at_once_are_one_kink(hertz: Model) -> Non
     assert abs(x[1]) < 1e-9 * abs(x[0])
 
 
+@pytest.mark.long
 def test_smoothed_laws_have_no_kinks_and_pay_for_none(make_model: Make, tmp_path: Path) -> None:
     smoothing = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
     model = make_model("varying_compliance", smoothing)
@@ -462,6 +468,7 @@ def test_smoothed_laws_have_no_kinks_and_pay_for_none(make_model: Make, tmp_path
     assert (located.statistics.kinks, located.statistics.located) == ("located", 0)
 
 
+@pytest.mark.long
 def test_opposite_balls_take_the_kink_of_one_sided_damping_out_of_the_motion(make_model: Make) -> None:
     """Preloaded, eight balls have nothing to locate, seven do."""
     changes = (*STANDING[1:], ONE_SIDED, ('clearance = "0 um"', 'clearance = "-20 um"'))

@@ -68,6 +68,7 @@ def test_the_least_peak_of_the_press_over_housing_damping_is_the_kink_of_an_inde
     assert "disagrees" not in dict(found.verdicts).values()
 
 
+@pytest.mark.long
 def test_a_wrong_gradient_is_caught(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
     press = make_model("punching_press")
     slopes = QuantityFunction.jacobian
@@ -99,6 +100,7 @@ def test_two_parameters_with_an_active_limit_against_a_fine_sweep(make_model: Ca
     assert found.value < within.min() < 1.02 * found.value
 
 
+@pytest.mark.long
 def test_the_worst_within_a_tolerance_that_acts_one_way_is_at_its_end(make_model: Callable[..., Model]) -> None:
     """The motion grows with the clearance: least at 5 um, where the worst is that of 7 um."""
     press = make_model("punching_press")

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from hand_written_press import Machine
+from quick_cases import long_but
 
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.native.casadi_integrators import METHODS as OF_CASADI
@@ -78,7 +79,7 @@ def test_reference_does_not_depend_on_its_method(press: Make, name: str) -> None
 
 
 @pytest.mark.parametrize("name", [SCENES[0], pytest.param(SCENES[1], marks=pytest.mark.long)])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", long_but(METHODS, "stepper"))
 def test_motion_converges_to_the_hand_written_press(press: Make, name: str, method: str) -> None:
     model = press(name)
     needs(model, method)

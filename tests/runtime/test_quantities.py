@@ -72,6 +72,7 @@ def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_mode
     assert report["integral:drive_torque", names[3]].dimensionless == pytest.approx(-1.0, abs=1e-10)
 
 
+@pytest.mark.long
 def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[..., Model]) -> None:
     """With zero clearance delta = const (F/k)^(2/3) and Q proportional to F: elasticities 2/3, -2/3, 1 and 0."""
     model = make_model("varying_compliance")
@@ -88,6 +89,7 @@ def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[...
         assert report[key].check.verdict.value == "verified"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("start_angle", [0.0, 4.5])
 def test_static_quantities_are_those_of_the_static_query_in_the_first_turn(
     make_model: Callable[..., Model], start_angle: float
@@ -133,6 +135,7 @@ def test_a_parameter_that_is_zero_has_no_elasticity_and_is_ranked_by_its_effect(
     assert "+0.0000" not in line
 
 
+@pytest.mark.long
 def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]) -> None:
     """Heavy preload makes the contacts linear: the outer ring on its housing then answers a constant load, and the
     amplitude at an order of the shaft falls with the housing's stiffness as the static compliance does."""
@@ -163,6 +166,7 @@ def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Mod
     assert fine.t[-1] == pytest.approx(turn)
 
 
+@pytest.mark.long
 def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> None:
     """Parseval: mean square about the mean is half the sum of squares of the harmonics' amplitudes."""
     model = make_model("four_bar")

@@ -102,6 +102,7 @@ def test_a_batch_is_a_loop_to_the_bit(function: QuantityFunction, rows: np.ndarr
     assert one.jacobian(rows[:2, :1]).shape == (2, 1)
 
 
+@pytest.mark.long
 def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFunction, rows: np.ndarray) -> None:
     table = rows[:3].copy()
     table[1, 1] = -1.0
@@ -120,6 +121,7 @@ def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFun
         getattr(lenient, call)(table)  # a warning would be an error: it is said once
 
 
+@pytest.mark.long
 def test_what_is_known_is_given_beside_what_is_not(smooth: Model) -> None:
     """At twice the speed the run of 0.8 turns is over before the time that is asked for."""
     known, beyond = ("rms:inner.y", "static_deflection@240deg"), "value:inner.y@0.08s"
@@ -135,6 +137,7 @@ def test_what_is_known_is_given_beside_what_is_not(smooth: Model) -> None:
         assert np.isnan(found[1, 1]).all()
 
 
+@pytest.mark.long
 def test_a_peak_that_passes_to_another_ball_is_warned_of_and_certified_as_a_kink(smooth: Model) -> None:
     """Where the largest forces of balls 1 and 2 are equal, those of either ball alone have the slopes on both sides."""
     balls = QuantityFunction(smooth, ("max:ball.force[1]", "max:ball.force[2]"), ANGLE, **SPAN)
@@ -158,6 +161,7 @@ def test_a_peak_that_passes_to_another_ball_is_warned_of_and_certified_as_a_kink
     assert pair.by_steps == given[0]
 
 
+@pytest.mark.long
 def test_the_certificate_is_of_the_numbers_of_the_jacobian(function: QuantityFunction) -> None:
     at = {MASS: 18.0}
     report = function.certify(at)
@@ -174,6 +178,7 @@ def test_derivatives_by_the_speed_are_known_as_others_are(smooth: Model) -> None
     np.testing.assert_allclose(usual.jacobian(usual.start), fine.jacobian(fine.start), rtol=2e-3)
 
 
+@pytest.mark.long
 def test_derivatives_that_mean_nothing_are_refused(
     press: Model, smooth: Model, function: QuantityFunction, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -222,6 +227,7 @@ def test_jax_finds_derivatives_right(smooth: Model, jax: ModuleType) -> None:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_jax_transforms_give_the_same_bits(jax: ModuleType, function: QuantityFunction, rows: np.ndarray) -> None:
     f, some = in_jax(function), rows[:2]
     expected, slopes = function(some), function.jacobian(some)

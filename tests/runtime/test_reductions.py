@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from press_laws import LAWS, press
+from quick_cases import long_but
 
 from ballpass.runtime import Model, RequestError, SimulationError, Solution
 from ballpass.runtime.native.driver_library import PLAIN
@@ -94,6 +95,7 @@ BETWEEN_QUARTERS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "method", "rtol", "parameters"), BETWEEN_QUARTERS)
 def test_extremes_beside_jumps_and_changes_of_rank_are_those_of_the_run(
     make_model: ModelMaker, law: str, method: str, rtol: float, parameters: dict[str, float]
@@ -118,7 +120,7 @@ def test_extremes_beside_jumps_and_changes_of_rank_are_those_of_the_run(
             assert sign * value == pytest.approx(highest[1], abs=1e-3 * size), (name, sign)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", long_but(LAWS, "one-sided", "tangent"))
 def test_extremes_are_values_the_model_has_at_their_times(make_model: ModelMaker, law: str) -> None:
     model = press(make_model, law)
     found = model.reduce(cycles=1, transient=0.25, rtol=1e-9)
@@ -223,6 +225,7 @@ def test_reductions_do_not_change_the_run(make_model: ModelMaker, one_library: C
     assert found.steps == run.statistics.steps
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_run(make_model: ModelMaker) -> None:
     model = press(make_model, "stiff")
     model.reduce(cycles=2, transient=1)

@@ -17,6 +17,7 @@ def press(make_model: Callable[..., Model]) -> Model:
     return make_model("punching_press")
 
 
+@pytest.mark.long
 def test_derivatives_by_parameters_with_long_names_fit_80_columns(press: Model) -> None:
     report = press.sensitivity(["peak_ball_force"], [LONGEST, "bearing.damping.ratio", "bearing.clearance"], 4)
     lines = to_text(report._report()).splitlines()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from press_laws import press
+from quick_cases import long_but
 
 from ballpass.runtime import IntegrationError, Model
 from ballpass.runtime.contract.method_registry import STEPPERS
@@ -66,9 +67,9 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     return outcome, [state, row, states], calls
 
 
-@pytest.mark.parametrize("kinks", ["stepped-over", "located"])
+@pytest.mark.parametrize("kinks", [pytest.param("stepped-over", marks=pytest.mark.long), "located"])
 @pytest.mark.parametrize("law", ["tangent", "two-sided-gated"])
-@pytest.mark.parametrize("method", STEPPERS)
+@pytest.mark.parametrize("method", long_but(STEPPERS, "stepper", "stepper-rodas4"))
 def test_a_run_has_the_same_bits_however_it_is_cut_into_calls(
     make_model: ModelMaker, law: str, method: str, kinks: str
 ) -> None:
@@ -134,6 +135,7 @@ def test_members_one_by_one_tell_progress_within_a_turn(
     assert len(calls) == 3
 
 
+@pytest.mark.long
 def test_an_interrupt_is_heard_while_a_run_crawls(make_model: ModelMaker) -> None:
     """Millions of steps a turn, which ended in one call; a process of its own takes the signal."""
     folder = press(make_model).folder
@@ -202,7 +204,7 @@ def test_a_run_that_crawls_is_given_up_by_reduce_where_simulate_gives_it_up(
         assert 0.0 < reduced.value.time < 3.0 * sampled.value.time < 0.1 * model.period()
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.parametrize("rtol", [1e-6, pytest.param(1e-8, marks=pytest.mark.long)])
 def test_runs_with_samples_and_with_reductions_have_one_limit(
     make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, rtol: float
 ) -> None:

@@ -60,6 +60,7 @@ def test_chaotic_points_are_on_no_curve_at_any_load(press: Model) -> None:
         assert "Lyapunov" in str(found)
 
 
+@pytest.mark.long
 def test_what_has_no_section_is_refused(press: Model, make_model: Callable[..., Model]) -> None:
     with pytest.raises(RequestError, match=r"inner\.y"):
         press.section("inner.z")

@@ -263,6 +263,7 @@ def test_wrong_requests_are_refused(make_model: Callable[..., Model]) -> None:
         model.sensitivities("bearing.clearance", cycles=1, sensitivity_rtol=0.0)
 
 
+@pytest.mark.long
 def test_derivatives_of_steps_that_end_on_kinks_reach_tolerances_that_others_do_not(
     make_model: Callable[..., Model],
 ) -> None:

@@ -30,6 +30,7 @@ def test_derivatives_by_window_and_speed_are_verified(model: Model) -> None:
         assert pair.derivative == pytest.approx(pair.check.value, rel=1e-5)
 
 
+@pytest.mark.long
 def test_without_the_jump_term_they_disagree(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """The driver is told that no edge moves; everything else stays."""
     monkeypatch.setattr(Chain, "breakpoint", lambda self, time: np.zeros(len(self.names)))

@@ -20,6 +20,7 @@ SCENE = Path(__file__).resolve().parents[2] / "scenes" / "punching_press.toml"
 LONG_PEAK = 4404.46
 
 
+@pytest.mark.long
 def test_settled_peaks_do_not_depend_on_the_ball_angle(make_model: object) -> None:
     model = make_model("punching_press")  # type: ignore[operator]
     two, settled = [], []
@@ -35,6 +36,7 @@ def test_settled_peaks_do_not_depend_on_the_ball_angle(make_model: object) -> No
     assert np.ptp(rms) < MEANS * np.mean(rms)
 
 
+@pytest.mark.long
 def test_twice_the_turns_change_a_settled_run_by_less_than_it_says(press: Model) -> None:
     found = press.settle()
     assert found.settled

@@ -184,6 +184,7 @@ def test_run_at_rest_without_load_stays_at_rest(model: Model) -> None:
     assert not solution.x.any()
 
 
+@pytest.mark.long
 def test_integration_that_diverges_stops_and_keeps_what_it_has(model: Model) -> None:
     changes = {"spring.damping": -400.0, "spring.stiffness": -1e6}
     with pytest.raises(IntegrationError) as caught:

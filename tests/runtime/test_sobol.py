@@ -47,6 +47,7 @@ def test_shares_of_the_ishigami_function() -> None:
     _check(variance_shares(*_members(2**14), seed=1), 0.01)
 
 
+@pytest.mark.long
 def test_one_member_in_twenty_without_a_result_spoils_nothing() -> None:
     a, b, mixed = _members(2**14)
     random = np.random.default_rng(1)

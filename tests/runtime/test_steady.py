@@ -126,6 +126,7 @@ def test_the_doubling_is_where_an_independent_solver_has_it_and_its_branch_is_fo
     assert "period doubling" in text
 
 
+@pytest.mark.long
 def test_a_fold_is_where_runs_leave_the_branch(rotor: Model) -> None:
     (branch,) = rotor.steady(over="shaft.speed=5920 rpm:5950 rpm").branches
     (fold,) = branch.special
@@ -197,6 +198,7 @@ def test_the_contacts_of_the_press_are_those_of_its_sampled_ball_forces(make_mod
     assert any(same(first) for first in range(8 * len(moments)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("over", "parameters", "added", "warned"),
     [
@@ -269,6 +271,7 @@ def test_ranges_are_refused(rotor: Model, over: str, words: str) -> None:
         rotor.steady(over=over)
 
 
+@pytest.mark.long
 def test_a_driver_whose_motion_is_a_state_is_refused(make_model: Callable[..., Model]) -> None:
     with pytest.raises(RequestError, match="driver's motion is a state"):
         make_model("punching_press_motor").steady()

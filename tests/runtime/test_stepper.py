@@ -356,6 +356,7 @@ def test_law_that_jumps_is_got_through_or_given_up_with_a_status(make_model: Mak
 # threads and memory
 
 
+@pytest.mark.long
 def test_eight_runs_at_once_give_the_bits_of_one_after_another(press: Model, magnitude: np.ndarray) -> None:
     settings = [
         (press.numbers({"bearing.clearance": 1e-6 * k}), family)
@@ -386,6 +387,7 @@ def test_driver_has_no_allocator_to_call(press: Model) -> None:
     assert b"\0pow\0" in code
 
 
+@pytest.mark.long
 def test_memory_stays_flat_over_hundreds_of_runs(rotor: Model) -> None:
     numbers = rotor.numbers()
     segments = segments_between(rotor, numbers, np.array([0.0, 0.01]))

@@ -7,6 +7,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from quick_cases import long_but
 from scipy.integrate import solve_ivp
 from stepper_methods import FAMILIES, NAMES, ORDERS
 from stepper_runs import edges_of, run, segments_between
@@ -162,7 +163,7 @@ def typical(errors: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("method", STEPPERS)
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", long_but(SCENES, "punching_press_tangent"))
 def test_every_family_converges_to_the_motion_cvodes_finds(
     oracle: Callable[[str], tuple[Model, np.ndarray, np.ndarray]], scene: str, method: str
 ) -> None:
@@ -185,6 +186,7 @@ def test_without_kinks_errors_fall_with_the_tolerance(make_model: Make, method: 
     assert all(tight < max(loose / 12, 2e-7) for loose, tight in pairwise(middle)), middle
 
 
+@pytest.mark.long
 def test_families_agree_among_each_other(make_model: Make) -> None:
     """On the crank-shaper, which magnifies errors more than the scenes above."""
     model = make_model("crank_shaper")

@@ -122,6 +122,7 @@ def test_results_that_no_bearing_could_have_are_errors(make_model: Callable[...,
             summarize(model, sampled)
 
 
+@pytest.mark.long
 def test_a_linkage_that_outweighs_its_ring_and_a_sudden_load_are_said(make_model: Callable[..., Model]) -> None:
     """The press: 19.7 kg on a ring of 0.414 kg."""
     for name in ("punching_press", "punching_press_two_way", "four_bar", "varying_compliance"):

@@ -88,7 +88,9 @@ def test_statistics_of_a_sine_of_noise_and_of_pulses() -> None:
     assert found.skewness == pytest.approx(0.98 / (0.01 * 0.99) ** 0.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["rotor", "punching_press", "punching_press_two_way"])
+@pytest.mark.parametrize(
+    "name", ["rotor", "punching_press", pytest.param("punching_press_two_way", marks=pytest.mark.long)]
+)
 def test_characteristic_frequencies_of_a_rolling_cage_are_the_kinematic_ones(
     make_model: Callable[..., Model], name: str
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_cases import long_but
 from typer.testing import CliRunner
 
 from ballpass.runtime import Model, SimulationError
@@ -38,7 +39,7 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scene_text: Callable[
     return path
 
 
-@pytest.mark.parametrize("words", COMMANDS)
+@pytest.mark.parametrize("words", long_but(COMMANDS, *COMMANDS[:3]))
 def test_commands_end_with_what_to_change(words: str, scene: Path) -> None:
     done = CliRunner().invoke(app, [*words.replace("SCENE", scene.name).split(), *SOFT.split()])
     assert done.exit_code == 1
