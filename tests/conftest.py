@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+import hashlib
 import os
 import shutil
 import signal
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -82,6 +85,12 @@ def _quick_compiler(request: pytest.FixtureRequest, tmp_path_factory: pytest.Tem
         yield
 
 
+def pytest_collection_finish() -> None:
+    """Thousands of tests and what they import stay: the collector of garbage need not go through them each time."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _fonts_known() -> None:
     """matplotlib looks for fonts once in an account, and says so on stderr where that takes long: not within a test."""
@@ -113,14 +122,24 @@ def scene_text() -> Callable[..., str]:
     return text
 
 
+@contextmanager
+def _place(tmp_path_factory: pytest.TempPathFactory, text: str, name: str) -> Iterator[Path]:
+    """Folder of a scene that the processes of a run derive once."""
+    folder = _shared(tmp_path_factory) / "generated" / hashlib.sha256(text.encode()).hexdigest()[:16] / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{folder.parent}.lock"):
+        yield folder
+
+
 @pytest.fixture(scope="session")
 def make_model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
     """Model of a shipped scene with replacements, generated and compiled once."""
 
     @cache
     def make(name: str, *changes: tuple[str, str]) -> Model:
-        folder = tmp_path_factory.mktemp(name) / name
-        return load(generate(scene_from_text(scene_text(name, *changes), name), folder))
+        text = scene_text(name, *changes)
+        with _place(tmp_path_factory, text, name) as folder:
+            return load(generate(scene_from_text(text, name), folder))
 
     return make
 
@@ -131,7 +150,9 @@ def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[
 
     @cache
     def make(name: str, *changes: tuple[str, str]) -> Model:
-        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
+        text = scene_text(name, *changes)
+        with _place(tmp_path_factory, text, name) as folder:
+            return virtual_model(text, folder)
 
     return make
 
