@@ -33,7 +33,7 @@ from ballpass.runtime.questions.question import declared
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "scenes"
-NAMES = ("punching_press", "four_bar", "varying_compliance")
+NAMES = ("punching_press", "varying_compliance")
 PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
 
 #: A compiler that does its work, in a hurry, unless the file beside it says no; its version stays the same, hence the
@@ -172,9 +172,12 @@ def test_results_are_the_files_that_were_promised(site: Site) -> None:
     assert summary["reaction.A.y"]["max"] >= solution.steady()["reaction.A.y"].max()
 
 
+@pytest.mark.long
 def test_a_second_run_gives_the_same_numbers(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
-    result = ballpass(site.folder, "run", SCENES / "four_bar.toml", "--json", "--no-figures", "--out", tmp_path)
-    again, first = json.loads(result.stdout), site.summary("four_bar")
+    result = ballpass(
+        site.folder, "run", SCENES / "varying_compliance.toml", "--json", "--no-figures", "--out", tmp_path
+    )
+    again, first = json.loads(result.stdout), site.summary("varying_compliance")
     for summary in (again, first):
         del summary["wall_time"], summary["files"]  # the digest of a solution, which tells its wall time
     assert again == first
@@ -231,6 +234,7 @@ def test_the_refusing_compiler_would_have_been_noticed(
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("refusing")
 def test_set_equals_the_same_value_in_the_file(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
     plain = ("--json", "--no-figures", "--out", tmp_path / "results")
@@ -271,6 +275,7 @@ def test_wrong_scene_is_refused_in_words_and_nothing_is_written(
         assert list(tmp_path.iterdir()) == [scene]
 
 
+@pytest.mark.long
 def test_empty_and_missing_files_are_refused_by_the_process(site: Site, tmp_path: Path) -> None:
     empty = tmp_path / "empty.toml"
     empty.touch()
@@ -426,6 +431,7 @@ def started(site: Site, folder: Path, *words: str) -> subprocess.Popen[str]:
     raise AssertionError(f"ended with {process.wait()}")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "length"),
     [("stepper", ("800", "1e-7")), pytest.param("cvodes", ("500", "1e-12"), marks=pytest.mark.long)],
@@ -562,6 +568,7 @@ def test_a_run_setting_given_as_a_parameter_is_told_its_option(
     says_no(ballpass(tmp_path, "run", SCENES / "varying_compliance.toml", "--set", setting), option)
 
 
+@pytest.mark.long
 def test_a_large_file_is_told_before_it_is_written_and_its_size_behind(
     site: Site, ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
