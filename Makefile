@@ -1,5 +1,5 @@
 # make demo    sets up, then runs the paper's press: derive, generate, compile, simulate, figures
-# make test    sets up, then runs the tests without the long ones: about nine minutes on two cores
+# make test    sets up, then runs the tests without the long ones: about five minutes on two cores
 # make lint    style, types, layers of imports, freshness of the committed artefact
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
