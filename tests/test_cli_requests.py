@@ -58,6 +58,7 @@ def test_instants_at_which_nothing_is_known_are_refused(
     ("words", "told"),
     [
         (("--duration", "1 s", "--cycles", "2"), "both given"),
+        (("--method", "cvodes", "--kinks", "located"), "cannot end its steps"),
         (("--duration", "1"), "unit is missing"),
         (("--duration", "1 mm"), "dimension"),
         (("--duration", "0 s"), "a time above 0"),
