@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +14,8 @@ import numpy as np
 import pytest
 from artefact import write_folder
 
-from ballpass.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
-from ballpass.runtime.native import compile
+from ballpass.runtime import CacheWarning, CompileError, Model, NoCompilerWarning, RequestError, load
+from ballpass.runtime.native import compile, functions
 
 # models made by hand here have no kernels
 pytestmark = pytest.mark.filterwarnings("ignore::ballpass.runtime.NoKernelsWarning")
@@ -222,3 +223,16 @@ def test_nothing_is_said_when_all_is_well(cache: Path, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load(write_folder(tmp_path / "model"))
+
+
+def test_a_large_source_is_compiled_without_optimization_and_gives_the_same_bits(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, make_model: Callable[..., Model]
+) -> None:
+    """The Jacobians of a bearing with every wave and five spalls (5 MB) took gcc longer than it may."""
+    folder, blocks = make_model("rotor").folder, []
+    for limit in (0, functions.LARGE):
+        monkeypatch.setattr(functions, "LARGE", limit)
+        model = load(folder)
+        blocks.append(np.asarray(model.jacobian("rhs", "states", t=0.01, x=[2e-5, 1e-5, 0.1, 0.2])))
+    assert np.array_equal(*blocks)
+    assert len(list(cache.glob("rotor_equations*"))) == 2

@@ -32,6 +32,10 @@ _INTERVALS = Option(words="Equal output intervals.", least=1)
 #: Names of derivatives.
 _DERIVATIVE = re.compile(r"(?P<of>\w+?)_(?:jac_(?P<along>[a-z])|tangent)")
 
+#: A source above this size [bytes] is compiled without optimization: what a compiler takes grows faster than its input,
+#: and Jacobians of a bearing with every wave and five spalls (5 MB) take gcc 180 s with -O1, 27 s without.
+LARGE = 2_000_000
+
 
 class _OwnMemory(threading.local):
     """Kernels and loops of one thread: a call fills their memory and reads it, so no other thread may have them."""
@@ -180,7 +184,8 @@ class CompiledFunctions:
                 compiler = self._find_compiler(f"{where}.c")
                 source, label = self.folder / f"{where}.c", f"{self.manifest.scene}_{where}"
                 digests = digests_of(self.folder, self.manifest)
-                self._libraries[where] = compile_sources((source,), compiler, label=label, digests=digests)
+                flags = ("-O0",) if source.stat().st_size > LARGE else ()
+                self._libraries[where] = compile_sources((source,), compiler, label=label, flags=flags, digests=digests)
             return self._libraries[where]
 
     def _find_compiler(self, source: str) -> Compiler:
