@@ -114,12 +114,13 @@ def generate(
     _refuse_foreign(folder)
     with shown("deriving equations, writing C"):
         system, functions = _derive_and_lower(read, say)
-        from ballpass.derive.emit.describe import describe
         from ballpass.derive.emit.folder import write_folder
 
-        look(describe(system, functions, source, ()))
-        say("emit")
+        if inspect is not None:
+            from ballpass.derive.emit.describe import describe
 
+            inspect(describe(system, functions, source, ()))
+        say("emit")
         replace_files(
             folder,
             lambda made: write_folder(made, system, functions, source),
