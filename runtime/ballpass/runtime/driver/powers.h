@@ -20,24 +20,31 @@ BP_POWER double bp_root_guess(double x, const int32_t n)
     return narrow;
 }
 
-/* x^n for a constant n >= 0. */
+/* x^n for a constant n >= 0, by squares; a loop, which stays one where it is not unrolled, only for n > 15. */
 BP_POWER double bp_whole_power(double x, const int n)
 {
-    double power = n > 0 ? x : 1.0;
-    for (int i = 1; i < n; i++) power *= x;
+    const double x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
+    double power = n & 1 ? x : 1.0;
+    if (n & 2) power *= x2;
+    if (n & 4) power *= x4;
+    if (n & 8) power *= x8;
+    for (int i = 0; i < n / 16; i++) power *= x8 * x8;
     return power;
 }
 
-/* 1 / x^(1/n) for a constant n > 2 and 1e-30 <= x <= 1e30, by steps of fourth order: two for a cube root, three for roots up to the twelfth. */
+/* A step of fourth order from r towards 1 / x^(1/n). */
+BP_POWER double bp_closer_root(double x, const int n, double r)
+{
+    const double a = 1.0 / n, b = (n + 1.0) / (2.0 * n * n), c = (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n * n * n);
+    const double left = 1.0 - x * bp_whole_power(r, n);
+    return r + r * left * (a + left * (b + left * c));
+}
+
+/* 1 / x^(1/n) for a constant n > 2 and 1e-30 <= x <= 1e30: two steps for a cube root, three for roots up to the twelfth. */
 BP_POWER double bp_inverse_root(double x, const int n)
 {
-    double r = bp_root_guess(x, n);
-    const double a = 1.0 / n, b = (n + 1.0) / (2.0 * n * n), c = (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n * n * n);
-    for (int i = 0; i < (n == 3 ? 2 : 3); i++) {
-        const double left = 1.0 - x * bp_whole_power(r, n);
-        r += r * left * (a + left * (b + left * c));
-    }
-    return r;
+    const double r = bp_closer_root(x, n, bp_closer_root(x, n, bp_root_guess(x, n)));
+    return n == 3 ? r : bp_closer_root(x, n, r);
 }
 
 /* x^(p/q) of constants p, q for x >= 0; where p < 0, or q > 2 and x below 1e-30, as if x were 1e-30 where it is smaller. */
