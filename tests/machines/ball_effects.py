@@ -46,6 +46,7 @@ def _spall(
     bearing: Bearing, value: Value, spall: Spall, ball: int, on_outer: complex, on_inner: complex, spin: complex
 ) -> complex:
     middle, small, pitch = value(spall.angle), value(bearing.ball_diameter) / 2, value(bearing.pitch_diameter) / 2
+    aside = small * (1.0 if bearing.contact_angle is None else math.cos(value(bearing.contact_angle)))
     if spall.on == "ball":
         if spall.ball != ball:
             return 0.0j
@@ -55,7 +56,7 @@ def _spall(
     total = 0.0j
     for ring, past in places:
         past = complex(math.remainder(past.real, 2 * math.pi), past.imag)
-        large = pitch + small if ring == "outer" else pitch - small
+        large = pitch + aside if ring == "outer" else pitch - aside
         own, other = (small, large) if spall.on == "ball" else (large, small)
         half = math.asin(value(spall.chord) / 2 / own)
         if abs(past.real) < half:

@@ -67,6 +67,7 @@ def bearing(
     balls: int = 8,
     stiffness: float | None = 8.6e9,
     effects: str = "",
+    angle: str = "",
 ) -> str:
     """Tables of a bearing coupled two-way at a joint; `inner` carries the inner ring; no stiffness: from geometry."""
     name = f"bearings.at_{joint}"
@@ -82,6 +83,7 @@ ball_diameter = "7.9375 mm"
 pitch_diameter = "33.5 mm"
 clearance = "{clearance}"
 ball_angle = "17 deg"
+{f'contact_angle = "{angle}"' if angle else ""}
 {"" if count is None else f"count = {count}"}
 [{name}.contact]
 {HERTZ if stiffness is None else f'stiffness = "{stiffness!r} N/m^1.5"'}

@@ -71,19 +71,24 @@ class Multibody(Absolute):
     def weights(self, bearing: Bearing) -> tuple[float, float]:
         """Raceways' radii roll on the ball: R_i w_i + R_o w_o over their sum; a cage that slips keeps less of the way
         over the ring that stands, or the outer one."""
-        ball, pitch = self.value(bearing.ball_diameter), self.value(bearing.pitch_diameter)
-        inner, outer = (pitch - ball) / 2, (pitch + ball) / 2
+        rolling, pitch = self.cosine(bearing) * self.value(bearing.ball_diameter), self.value(bearing.pitch_diameter)
+        inner, outer = (pitch - rolling) / 2, (pitch + rolling) / 2
         kept = 1.0 - (self.value(bearing.cage.slip) if bearing.cage is not None else 0.0)
         if bearing.inner_body == FRAME:
             return 1.0 - kept * outer / (inner + outer), kept * outer / (inner + outer)
         return kept * inner / (inner + outer), 1.0 - kept * inner / (inner + outer)
+
+    def cosine(self, bearing: Bearing) -> float:
+        """Of the contact angle."""
+        return 1.0 if bearing.contact_angle is None else math.cos(self.value(bearing.contact_angle))
 
     def taken(self, bearing: Bearing, ball: int, q: Array) -> tuple[float, float]:
         """What effects take from a ball's deflection, and its slope over the inner ring's angle against the outer."""
         angle, (inner, outer) = self.ball_angle(bearing, q), self.turned(bearing, q)
         share, step = self.weights(bearing)[0], 1e-200j
         angle += TURN * (ball - 1) / bearing.balls
-        passed = 1 + self.value(bearing.pitch_diameter) / self.value(bearing.ball_diameter)
+        # the circle of contacts on the outer raceway over the ball's radius
+        passed = self.cosine(bearing) + self.value(bearing.pitch_diameter) / self.value(bearing.ball_diameter)
         found = taken(
             bearing,
             self.value,
@@ -130,14 +135,14 @@ class Multibody(Absolute):
         return total**-1.5
 
     def balls(self, bearing: Bearing, q: Array, v: Array) -> Iterator[tuple[float, float, Array, Array]]:
-        """Of each ball: deflection, force, gradient of the deflection along all coordinates, direction."""
+        """Of each ball: deflection, force, gradient of the deflection along all coordinates, what of it is radial."""
         inner, _, outer = self.play(bearing, q, v)
         apart, joint = inner - outer, self.mechanism.joint(bearing.joint or "")
         roll, angle = self.weights(bearing), self.ball_angle(bearing, q)
         turn = roll[0] * self.row(bearing.inner_body) + roll[1] * self.row(joint.other(bearing.inner_body))
         for j in range(bearing.balls):
-            along = rotation(angle + TURN * j / bearing.balls) @ np.array([1.0, 0.0])
-            delta = float(apart.position @ along) - self.value(bearing.clearance) / 2
+            along = self.cosine(bearing) * rotation(angle + TURN * j / bearing.balls) @ np.array([1.0, 0.0])
+            delta = float(apart.position @ along) - self.cosine(bearing) * self.value(bearing.clearance) / 2
             gradient = along @ apart.jacobian + float(apart.position @ QUARTER @ along) * turn
             if bearing.effects:
                 amount, slope = self.taken(bearing, j + 1, q)

@@ -96,6 +96,11 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         ),
     ),
     "press, effects": ("punching_press", (), (bearing("A", elastic=True, count=2, effects=EFFECTS + SPALLS),)),
+    "press, effects, contact angle": (
+        "punching_press",
+        driven_by(MOTOR),
+        (bearing("A", "frame", angle="25 deg", effects=EFFECTS + SPALLS), bearing("B", "rod", effects=EFFECTS)),
+    ),
     "press, effects, outer ring on the crank": (
         "punching_press",
         (),

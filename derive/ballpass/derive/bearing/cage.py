@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from ballpass.derive.bearing.cage_slip import kept_share, lag_of
-from ballpass.derive.bearing.contact_direction import contact_cosine
+from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
 from ballpass.derive.drive import Drive, OverAngle
@@ -81,7 +81,7 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False
     over_turning = passing.symbol + pass_speed * TIME - behind
     still, moving = (angle, speed), (over_turning, pass_speed)
     passes = Passing(outer=moving, inner=still, even=True) if outer else Passing(outer=still, inner=moving, even=True)
-    spin = _spin(bearing, names, passes.outer[1], -_rolls(bearing) * behind) if _spins(bearing) else None
+    spin = _spin(bearing, names, passes.outer[1], -ball_turns(bearing) * behind) if _spins(bearing) else None
     met = _met(bearing, names, passes)
     return Cage(
         angle=angle,
@@ -114,11 +114,6 @@ def _spins(bearing: Bearing) -> bool:
     return any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
 
 
-def _rolls(bearing: Bearing) -> sp.Expr:
-    """Turns of a ball, seen from the cage, for one of the cage over the outer raceway, on which balls roll."""
-    return contact_cosine(bearing) + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
-
-
 def _spin(bearing: Bearing, names: Names, over_outer: sp.Expr, swung: sp.Expr) -> _Spin:
     """Balls that roll on the outer raceway: as much of their surface passes as of the raceway.
 
@@ -144,7 +139,7 @@ def _spin(bearing: Bearing, names: Names, over_outer: sp.Expr, swung: sp.Expr) -
             names.define(start, sp.S.Zero, "rad", f"{words} at the start, from which it is counted", r"\chi_{00}"),
             names.define(
                 speed,
-                _rolls(bearing) * over_outer,
+                ball_turns(bearing) * over_outer,
                 "rad/s",
                 "Speed of the balls about their own axes, seen from the cage",
                 r"\omega_w",
@@ -242,7 +237,7 @@ def cage_between(
         "speed of the inner ring relative to the outer one",
         names.latex(r"\omega_{io}"),
     )
-    rolls, spin = _rolls(bearing), None
+    rolls, spin = ball_turns(bearing), None
     if _spins(bearing):
         spin = _spin(bearing, names, over_outer, rolls * share * apart)
         constants += spin.constants

@@ -40,6 +40,11 @@ def contact_cosine(bearing: Bearing) -> sp.Expr:
     return Names(prefix=bearing.prefix, path=bearing.path).constant("cos_contact_angle")
 
 
+def ball_turns(bearing: Bearing) -> sp.Expr:
+    """Turns of a ball, seen from the cage, for one of the cage over the outer raceway, on which balls roll."""
+    return contact_cosine(bearing) + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
+
+
 def contact_direction(bearing: Bearing) -> ContactDirection:
     """The direction of the contacts of a bearing."""
     names, cosine = Names(prefix=bearing.prefix, path=bearing.path), contact_cosine(bearing)

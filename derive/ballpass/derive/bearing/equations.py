@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.cage import Cage
-from ballpass.derive.bearing.contact_direction import contact_direction
+from ballpass.derive.bearing.contact_direction import ball_turns, contact_direction
 from ballpass.derive.bearing.effects import EFFECTS, GenericBall
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.laws import LAWS
@@ -286,8 +286,10 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
     ]
     further = {}
     if cage.spin is not None:
-        rolls = 1 + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
-        further[spin] = cage.spin, sp.diff(cage.spin, TIME) if cage.ring_rate is None else rolls * cage.share
+        further[spin] = (
+            cage.spin,
+            sp.diff(cage.spin, TIME) if cage.ring_rate is None else ball_turns(bearing) * cage.share,
+        )
     ball = GenericBall(balls=bearing.balls, on_outer=on_outer, on_inner=on_inner, from_first=from_first, spin=spin)
     taken = sum((EFFECTS[e.kind].term(e, bearing, names, ball) for e in bearing.effects), start=sp.S.Zero)
     return own_terms(taken, axes, further, (cos, sin), names, cage.ring_rate) if taken != 0 else None

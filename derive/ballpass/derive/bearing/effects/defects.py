@@ -21,7 +21,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
-from ballpass.derive.bearing.contact_direction import contact_cosine
+from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Passing
 from ballpass.derive.drive import OverAngle
 from ballpass.derive.drive.angle_state import window_gate
@@ -258,11 +258,7 @@ class _SpallContact:
     @property
     def _lags(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
         """What the lag of a cage whose slip changes adds to the angle of the windows, row by row."""
-        each = self.bearing.balls
-        if self.spall.on == "ball":
-            each = contact_cosine(self.bearing) + symbol_of(self.bearing.pitch_diameter) / symbol_of(
-                self.bearing.ball_diameter
-            )
+        each = ball_turns(self.bearing) if self.spall.on == "ball" else self.bearing.balls
         lags = lag_names(self.bearing, self.names)
         return tuple((self._symbol(f"lag.{k}"), -each * lag) for k, lag in enumerate(lags, start=1))
 
