@@ -66,7 +66,7 @@ static inline void bp_0_held_forces_lanes(const double *restrict co, const doubl
         w0 = (double)(w0 < w1);
         w5 = b[0 * BP_0_BALLS + lane];
         w5 = (double)(w5 < w1);
-        w0 = (double)(w0 != 0.0 && w5 != 0.0);
+        w0 = (double)(w0 * w5 != 0.0);
         w5 = k[0];
         double w6 = sqrt(w1);
         w1 = w1 * w6;
@@ -107,7 +107,7 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
         w0 = (double)(w0 < w6);
         w7 = b[0 * BP_0_BALLS + lane];
         w7 = (double)(w7 < w6);
-        w0 = (double)(w0 != 0.0 && w7 != 0.0);
+        w0 = (double)(w0 * w7 != 0.0);
         w7 = k[0];
         double w8 = sqrt(w6);
         w6 = w6 * w8;
@@ -171,7 +171,7 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         w12 = (double)(w0 < w9);
         double w13 = b[0 * BP_0_BALLS + lane];
         w13 = (double)(w13 < w9);
-        w12 = (double)(w12 != 0.0 && w13 != 0.0);
+        w12 = (double)(w12 * w13 != 0.0);
         w13 = k[0];
         double w14 = sqrt(w9);
         double w15 = w9 * w14;

@@ -50,8 +50,9 @@ _BINARY = {
     ca.OP_LE: "(double)({0} <= {1})",
     ca.OP_EQ: "(double)({0} == {1})",
     ca.OP_NE: "(double)({0} != {1})",
-    ca.OP_AND: "(double)({0} != 0.0 && {1} != 0.0)",
-    ca.OP_OR: "(double)({0} != 0.0 || {1} != 0.0)",
+    # of comparisons, 0 or 1; loops around && or || become no vectors
+    ca.OP_AND: "(double)({0} * {1} != 0.0)",
+    ca.OP_OR: "(double)({0} + {1} != 0.0)",
     # a selection, not a product: the value that is not selected may be NaN
     ca.OP_IF_ELSE_ZERO: "({0} != 0.0 ? {1} : 0.0)",
 }
