@@ -18,21 +18,26 @@ static const double bp_has_rate[8] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
 static inline void bp_0_switches_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
 {
     (void)k;
+    const double r_0 = r[0];
+    const double r_1 = r[1];
+    const double r_2 = r[2];
+    const double r_3 = r[3];
+    const double r_4 = r[4];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
-        double w0 = r[0];
-        double w1 = r[1];
+        double w0 = r_0;
+        double w1 = r_1;
         double w2 = co[0 * BP_0_BALLS + lane];
         w1 = w1 * w2;
         w0 = w0 + w1;
-        w1 = r[2];
+        w1 = r_2;
         double w3 = si[0 * BP_0_BALLS + lane];
         w1 = w1 * w3;
         w0 = w0 + w1;
         rows[0 * BP_0_BALLS + lane] = w0;
-        w0 = r[3];
+        w0 = r_3;
         w0 = w0 * w2;
-        w2 = r[4];
+        w2 = r_4;
         w2 = w2 * w3;
         w0 = w0 + w2;
         rows[1 * BP_0_BALLS + lane] = w0;
@@ -42,32 +47,39 @@ static inline void bp_0_switches_lanes(const double *restrict co, const double *
 /* Summands of the forces, sides held. 20 operations a ball. */
 static inline void bp_0_held_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
+    const double r_3 = r[3];
+    const double r_4 = r[4];
+    const double k_1 = k[1];
+    const double r_0 = r[0];
+    const double r_1 = r[1];
+    const double r_2 = r[2];
+    const double k_0 = k[0];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
         double w0 = 0.0;
-        double w1 = r[3];
+        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
         w1 = w1 * w2;
-        double w3 = r[4];
+        double w3 = r_4;
         double w4 = si[0 * BP_0_BALLS + lane];
         w3 = w3 * w4;
         w1 = w1 + w3;
         w3 = (double)(w0 < w1);
-        double w5 = k[1];
+        double w5 = k_1;
         w1 = w1 * w5;
         w3 = (w3 != 0.0 ? w1 : 0.0);
-        w1 = r[0];
-        w5 = r[1];
+        w1 = r_0;
+        w5 = r_1;
         w5 = w5 * w2;
         w1 = w1 + w5;
-        w5 = r[2];
+        w5 = r_2;
         w5 = w5 * w4;
         w1 = w1 + w5;
         w0 = (double)(w0 < w1);
         w5 = b[0 * BP_0_BALLS + lane];
         w5 = (double)(w5 < w1);
         w0 = (double)(w0 * w5 != 0.0);
-        w5 = k[0];
+        w5 = k_0;
         double w6 = sqrt(w1);
         w1 = w1 * w6;
         w5 = w5 * w1;
@@ -83,32 +95,40 @@ static inline void bp_0_held_forces_lanes(const double *restrict co, const doubl
 /* The same, and of their slopes. 36 operations a ball. */
 static inline void bp_0_held_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
+    const double r_3 = r[3];
+    const double r_4 = r[4];
+    const double k_1 = k[1];
+    const double r_0 = r[0];
+    const double r_1 = r[1];
+    const double r_2 = r[2];
+    const double k_0 = k[0];
+    const double k_2 = k[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
         double w0 = 0.0;
-        double w1 = r[3];
+        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
         w1 = w1 * w2;
-        double w3 = r[4];
+        double w3 = r_4;
         double w4 = si[0 * BP_0_BALLS + lane];
         w3 = w3 * w4;
         w1 = w1 + w3;
         w3 = (double)(w0 < w1);
-        double w5 = k[1];
+        double w5 = k_1;
         w1 = w1 * w5;
         w1 = (w3 != 0.0 ? w1 : 0.0);
-        double w6 = r[0];
-        double w7 = r[1];
+        double w6 = r_0;
+        double w7 = r_1;
         w7 = w7 * w2;
         w6 = w6 + w7;
-        w7 = r[2];
+        w7 = r_2;
         w7 = w7 * w4;
         w6 = w6 + w7;
         w0 = (double)(w0 < w6);
         w7 = b[0 * BP_0_BALLS + lane];
         w7 = (double)(w7 < w6);
         w0 = (double)(w0 * w7 != 0.0);
-        w7 = k[0];
+        w7 = k_0;
         double w8 = sqrt(w6);
         w6 = w6 * w8;
         w7 = w7 * w6;
@@ -118,7 +138,7 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
         rows[0 * BP_0_BALLS + lane] = w7;
         w1 = w1 * w4;
         rows[1 * BP_0_BALLS + lane] = w1;
-        w1 = k[2];
+        w1 = k_2;
         w1 = w1 * w8;
         w8 = w2 * w2;
         w7 = w1 * w8;
@@ -147,32 +167,40 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
 /* The same, and derivatives of the forces by the ball's angle, by r0 and by k. 76 operations a ball. */
 static inline void bp_0_held_partials_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
+    const double r_3 = r[3];
+    const double r_4 = r[4];
+    const double k_1 = k[1];
+    const double r_0 = r[0];
+    const double r_1 = r[1];
+    const double r_2 = r[2];
+    const double k_0 = k[0];
+    const double k_2 = k[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
         double w0 = 0.0;
-        double w1 = r[3];
+        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
         double w3 = w1 * w2;
-        double w4 = r[4];
+        double w4 = r_4;
         double w5 = si[0 * BP_0_BALLS + lane];
         double w6 = w4 * w5;
         w3 = w3 + w6;
         w6 = (double)(w0 < w3);
-        double w7 = k[1];
+        double w7 = k_1;
         double w8 = w3 * w7;
         w8 = (w6 != 0.0 ? w8 : 0.0);
-        double w9 = r[0];
-        double w10 = r[1];
+        double w9 = r_0;
+        double w10 = r_1;
         double w11 = w10 * w2;
         w9 = w9 + w11;
-        w11 = r[2];
+        w11 = r_2;
         double w12 = w11 * w5;
         w9 = w9 + w12;
         w12 = (double)(w0 < w9);
         double w13 = b[0 * BP_0_BALLS + lane];
         w13 = (double)(w13 < w9);
         w12 = (double)(w12 * w13 != 0.0);
-        w13 = k[0];
+        w13 = k_0;
         double w14 = sqrt(w9);
         double w15 = w9 * w14;
         double w16 = w13 * w15;
@@ -182,7 +210,7 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         rows[0 * BP_0_BALLS + lane] = w16;
         w8 = w8 * w5;
         rows[1 * BP_0_BALLS + lane] = w8;
-        double w17 = k[2];
+        double w17 = k_2;
         w17 = w17 * w14;
         double w18 = w2 * w2;
         double w19 = w17 * w18;
@@ -264,21 +292,25 @@ static inline void bp_0_switches_moved_lanes(const double *restrict co, const do
 {
     (void)k;
     (void)k_d;
+    const double co_0 = co[0];
+    const double r_1 = r[1];
+    const double si_0 = si[0];
+    const double r_2 = r[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_LANES; lane++) {
         double w0 = r_d[0 * BP_LANES + lane];
-        double w1 = co[0];
+        double w1 = co_0;
         double w2 = r_d[1 * BP_LANES + lane];
         w1 = w1 * w2;
-        w2 = r[1];
+        w2 = r_1;
         double w3 = co_d[0 * BP_LANES + lane];
         w2 = w2 * w3;
         w1 = w1 + w2;
         w0 = w0 + w1;
-        w1 = si[0];
+        w1 = si_0;
         w2 = r_d[2 * BP_LANES + lane];
         w1 = w1 * w2;
-        w2 = r[2];
+        w2 = r_2;
         w3 = si_d[0 * BP_LANES + lane];
         w2 = w2 * w3;
         w1 = w1 + w2;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 from ballpass.runtime.contract.method_registry import METHODS
+from ballpass.runtime.native import driver_library
+from ballpass.runtime.native.compilers import find_compiler
 from ballpass.runtime.native.reduction_rows import BALL_CHANNELS, JUMPS
 from ballpass.runtime.ratings.readings import KINDS as LIVES
 
@@ -140,3 +143,35 @@ def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of: 
                 expected = (one.maximum, one.minimum, one.mean, one.rms)
                 found = (other.maximum, other.minimum, other.mean, other.rms)
                 assert found == pytest.approx(expected, rel=0.0, abs=1e-6 * one.range), (k, channel)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="this is a claim about gcc, which is not installed")
+@pytest.mark.parametrize(
+    ("scene", "driver"),
+    [
+        ("punching_press", driver_library.LOCATING),
+        ("punching_press", driver_library.DIFFERENTIATING_LOCATED),
+        ("punching_press_tangent", driver_library.DIFFERENTIATING_LOCATED),
+        ("punching_press_roller", driver_library.LOCATING),
+        ("punching_press_roller", driver_library.PLAIN),
+        ("punching_press_roller", driver_library.ENSEMBLE),
+    ],
+    ids=lambda value: getattr(value, "kind", value),
+)
+def test_every_loop_over_elements_or_directions_is_vector_code(
+    scene: str, driver: driver_library.DriverSources, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the generated kernels, as gcc says: loops that it leaves run one by one, which is right and slow."""
+    monkeypatch.setenv("BALLPASS_CACHE", str(tmp_path / "cache"))
+    said = tmp_path / "said.txt"
+    compiler = find_compiler(f"gcc -fopt-info-vec-all={said}")
+    assert compiler is not None
+    folder = generate(scene_from_text(shipped(scene), scene), tmp_path / scene)
+    driver_library.compile_driver(folder, load(folder).manifest, compiler, driver)
+    loops = re.findall(
+        r"((?:kernels|switches|tangents)\.h:\d+):\d+: (optimized: loop vectorized|missed: couldn't vectorize loop)",
+        said.read_text(),
+    )
+    assert len(loops) > 2
+    assert {place for place, how in loops if how.startswith("missed")} == set()

@@ -95,6 +95,7 @@ def print_function(
     name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
     lines = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
     lines += _unused(function)
+    head = len(lines)
     if lanes:
         lines += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
     indent = "        " if lanes else "    "
@@ -117,6 +118,10 @@ def print_function(
             elif lanes and name in strided:
                 place = f"{take[1]} * {lanes}"
             text = name if name in by_value else f"{name}[{place}]"
+            if lanes and name not in varying | by_value:
+                # loaded before the loop: gcc makes no vectors of loops that load such a number only in some lanes
+                lines.insert(head, f"    const double {name}_{take[1]} = {text};")
+                head, text = head + 1, f"{name}_{take[1]}"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))
         elif k in exponents:
