@@ -20,6 +20,7 @@ from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
+from ballpass.derive.scene.records import FRAME
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf
@@ -130,6 +131,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             lubrication=lubrication_info(bearing),
             alignment=alignment_info(bearing),
             element=bearing.element,
+            inner_stands=bearing.inner_body == FRAME or (scene.shaft is not None and scene.shaft.ring == "outer"),
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

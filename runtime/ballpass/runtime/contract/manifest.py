@@ -256,7 +256,8 @@ class BearingInfo:
     `name` is empty for the scene's only ``[bearing]``.  Its states and outputs begin with `prefix`, ``""`` or
     ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
-    `element` is the kind of its rolling elements, for which "ball" stands in all other names.
+    `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
+    whether the inner ring stands in the frame and the outer one turns.
     """
 
     name: str
@@ -271,6 +272,7 @@ class BearingInfo:
     catalogue: CatalogueInfo | None = None
     lubrication: LubricationInfo | None = None
     element: str = "ball"
+    inner_stands: bool = False
     alignment: AlignmentInfo | None = None
 
 

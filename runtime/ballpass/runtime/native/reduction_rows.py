@@ -72,7 +72,7 @@ class LoadPowerRow:
 POWERS = (
     LoadPowerRow(name="load.turning", exponent="TURNING"),
     LoadPowerRow(name="load.standing", exponent="STANDING"),
-    LoadPowerRow(name="load.outer_damage", exponent="DAMAGE", of="load.standing"),
+    LoadPowerRow(name="load.standing_damage", exponent="DAMAGE", of="load.standing"),
 )
 
 #: One, whose integral is the angle that the inner ring turned against the outer one [rad].

@@ -105,7 +105,7 @@ const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * v
 
 // Rating life of a bearing [h], the shortest of the readings of `ballpass life`, over the passes of this run; 0 where its
 // rings do not turn against each other.
-function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors } }) {
+function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors, inner_stands } }) {
   const seen = (node, ring) => node[seenAt + 2 * cage + ring], apart = nodes.map((node) => seen(node, 0) - seen(node, 1));
   // how far the rings turn from one node to the next; angles of cages come back after a turn
   const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
@@ -132,14 +132,15 @@ function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, we
     sums[2] += weight * (other / force.length) ** (1 / weibull) * force.length;
   });
   if (!(Math.abs(turned.reduce((sum, angle) => sum + angle)) > 0.5 * passes)) return 0;
-  const [inner, mean, miner] = sums.map((sum, n) => (sum / (passes * force.length)) ** (1 / [turning, standing, turning][n]));
+  const [cubic, mean, miner] = sums.map((sum, n) => (sum / (passes * force.length)) ** (1 / [turning, standing, turning][n]));
   const [onOuter, onInner] = fields.map((field) => {
     field[0] += field[sectors];
     return (field.subarray(0, sectors).reduce((sum, power) => sum + (sectors * power / (passes * force.length)) ** weibull, 0) / sectors) ** (1 / standing);
   });
   const turns = ([first, second]) => 1e6 * ((first / ratings[2 * cage]) ** standing + (second / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
   const speed = passes / (nodes[last][0] - nodes[0][0]);
-  return Math.min(...[[inner, mean], [inner, miner], [onInner, onOuter]].map(turns)) * TURN / speed / 3600;
+  const readings = [[cubic, mean], [cubic, miner]].map((pair) => inner_stands ? pair.reverse() : pair);
+  return Math.min(...[...readings, [onInner, onOuter]].map(turns)) * TURN / speed / 3600;
 }
 
 // Highest values of measures of a sample, between samples too: the steps do not depend on what is read.

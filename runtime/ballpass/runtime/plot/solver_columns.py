@@ -166,7 +166,7 @@ def _bearing(
     }
 
 
-def _life(bearing: BearingInfo) -> dict[str, float]:
+def _life(bearing: BearingInfo) -> dict[str, float | bool]:
     """How a life depends on the loads; see `ballpass.runtime.ratings.life.ElementLife`."""
     of = rated_element(bearing).life
     return {
@@ -174,4 +174,5 @@ def _life(bearing: BearingInfo) -> dict[str, float]:
         "standing": float(of.standing),
         "weibull": float(of.weibull),
         "sectors": SECTORS,
+        "inner_stands": bearing.inner_stands,
     }

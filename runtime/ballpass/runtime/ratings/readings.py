@@ -3,7 +3,8 @@
 In: mean powers of the loads over the passes.  Out: equivalent loads of both rings [N], lives [turns].
 
 A history has more than one reading.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
-and the other standing, over the passes as well.  `miner` takes the damage of the standing ring at every instant and
+and the other standing, over the passes as well.  The ring that stands is the outer one, or the inner one where that
+stands in the frame and the outer one turns.  `miner` takes the damage of the standing ring at every instant and
 adds it up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the
 ring's own coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft,
 as a punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
@@ -27,8 +28,8 @@ KILO = 1e3
 
 #: Readings, and their descriptions.
 READINGS = {
-    "mean": "ISO 16281, inner ring turning against the load, outer ring standing, means over the passes",
-    "miner": "the same, the damage of the outer ring added up instant by instant",
+    "mean": "ISO 16281, one ring turning against the load, the other standing, means over the passes",
+    "miner": "the same, the damage of the ring that stands added up instant by instant",
     "sectors": "damage of every place of both raceways, the ring as it turns",
 }
 
@@ -44,25 +45,28 @@ class LoadPowers:
     ----------
     turning : of the power of the balls' loads that damages a turning ring, over the balls as well; of balls [kN^3]
     standing : of the power that damages a standing ring; of balls [kN^(10/3)]
-    outer_damage : of the mean over the balls of the latter, to the power that makes damage of it; of balls [kN^3]
+    standing_damage : of the mean over the balls of the latter, to the power that makes damage of it; of balls [kN^3]
+    inner_stands : whether the inner ring stands and the outer one turns
     raceways : of the first power at each place of the outer, then of the inner raceway, over the balls that pass,
         shape (..., 2, places) ; None where it is not known
     """
 
     turning: Any
     standing: Any
-    outer_damage: Any
+    standing_damage: Any
+    inner_stands: Any = False
     raceways: Any = None
 
 
 def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[Any, Any]]:
     """Q_ei and Q_ee of every reading [N]; not of `sectors` where the raceways are not known."""
     root = float(1 / of.turning)
-    inner = KILO * powers.turning**root
-    found = {
-        "mean": (inner, KILO * powers.standing ** float(1 / of.standing)),
-        "miner": (inner, KILO * powers.outer_damage**root),
+    turning = KILO * powers.turning**root
+    pairs = {
+        "mean": (turning, KILO * powers.standing ** float(1 / of.standing)),
+        "miner": (turning, KILO * powers.standing_damage**root),
     }
+    found = {name: pair[::-1] if powers.inner_stands else pair for name, pair in pairs.items()}
     if powers.raceways is not None:
         places = (np.moveaxis(powers.raceways[..., ring, :], -1, 0) for ring in (1, 0))
         found["sectors"] = tuple(KILO * sector_ball_load(place, of) for place in places)

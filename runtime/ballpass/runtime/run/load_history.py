@@ -118,7 +118,8 @@ def _history(going: ReducedRun) -> LoadHistory:
         powers[bearing.prefix] = LoadPowers(
             turning=float(found.turning[0]),
             standing=float(found.standing[0]),
-            outer_damage=float(found.outer_damage[0]),
+            standing_damage=float(found.standing_damage[0]),
+            inner_stands=bearing.inner_stands,
             raceways=found.raceways[0],
         )
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)

@@ -253,6 +253,8 @@ def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> L
     layout = reduction_rows(manifest)
     every = {name: rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS}
     turned = np.where(every[TURNED] > 0.0, every[TURNED], np.inf)  # no pass, no damage
-    turning, standing, damage = (every[f"load.{name}"] / turned for name in ("turning", "standing", "outer_damage"))
+    turning, standing, damage = (every[f"load.{name}"] / turned for name in ("turning", "standing", "standing_damage"))
     places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
-    return LoadPowers(turning=turning, standing=standing, outer_damage=damage, raceways=places)
+    return LoadPowers(
+        turning=turning, standing=standing, standing_damage=damage, inner_stands=bearing.inner_stands, raceways=places
+    )

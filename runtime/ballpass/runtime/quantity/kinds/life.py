@@ -52,7 +52,10 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
     ratings, moved_ratings = _ratings(view, bearing)
     passes = _over_passes(view, prefix)
-    powers, moved_powers = _powers(passes, quantity, prefix, ratings.life, raceways="sectors" in readings)
+    powers, moved_powers = (
+        replace(one, inner_stands=bearing.inner_stands)
+        for one in _powers(passes, quantity, prefix, ratings.life, raceways="sectors" in readings)
+    )
     found = lives(ratings, powers)
     shortest = min(readings, key=lambda reading: found[reading])
     notes = (f"of {shortest}",) if len(readings) > 1 else ()
@@ -122,7 +125,7 @@ def _powers(
     duals: dict[str, Dual] = {
         "turning": view.mean(*over_balls(float(of.turning))),
         "standing": view.mean(more, more_slope),
-        "outer_damage": view.mean(more**root, root * inverse[:, None] * more_slope),
+        "standing_damage": view.mean(more**root, root * inverse[:, None] * more_slope),
     }
     if raceways:
         values, slopes = zip(
