@@ -155,15 +155,16 @@ let current = null, scene = null; // runs: what is shown, and that of the scene'
 
 function drawOrbit(bearing, number) {
   if (!bearing || !current) return null;
-  const section = element(get("charts"), "section", "", { class: "orbit" }), path = (run) => all(run.inner[0]).map((x, k) => [x, -at(run.inner[1], k)]);
+  const section = element(get("charts"), "section", "", { class: "orbit" });
   element(section, "h2", "Orbit of the inner ring against the outer [\u00b5m]");
   const picture = draw(section, "svg", { viewBox: "-60 -60 120 120", role: "img", "aria-label": "orbit of the inner ring" });
-  const old = compared ? path(compared.run.bearings[number]) : [], now = path(bearing), limit = 1e6 * bearing.clearance / 2;
-  const unit = 50 / highest([...old, ...now].map(length).concat(Math.abs(limit))), scaled = (places) => joined(places.map((place) => place.map((part) => part * unit)));
+  const orbits = [bearing, before((run) => run.bearings[number])].filter(Boolean).map(({ inner }) => inner.map(all)), limit = 1e6 * bearing.clearance / 2;
+  const unit = 50 / highest(orbits.map(([xs, ys]) => highest(xs.map((x, k) => length([x, ys[k]])))).concat(Math.abs(limit)));
+  const [now, old] = orbits.map(([xs, ys]) => traced(xs.map((x) => unit * x), ys.map((y) => -unit * y)));
   for (const [x, y] of [[1, 0], [0, 1]]) draw(picture, "line", { x1: -56 * x, x2: 56 * x, y1: -56 * y, y2: 56 * y, stroke: "var(--grid)", "stroke-width": 0.5 });
   if (limit > 0) draw(picture, "circle", { r: limit * unit, fill: "none", stroke: "var(--soft)", "stroke-width": 0.4, "stroke-dasharray": "2 1.5" });
-  draw(picture, "polyline", { points: scaled(old), fill: "none", stroke: "var(--soft)", "stroke-width": 0.5, "stroke-dasharray": "1 1" });
-  draw(picture, "polyline", { points: scaled(now), fill: "none", stroke: "var(--ink)", "stroke-width": 0.8, "stroke-linejoin": "round" });
+  if (old) draw(picture, "polyline", { points: old, fill: "none", stroke: "var(--soft)", "stroke-width": 0.5, "stroke-dasharray": "1 1" });
+  draw(picture, "polyline", { points: now, fill: "none", stroke: "var(--ink)", "stroke-width": 0.8, "stroke-linejoin": "round" });
   const dot = draw(picture, "circle", { r: 1.8, fill: "var(--signal)" });
   for (const value of ticks(0, 56 / unit).slice(1)) draw(picture, "text", { x: value * unit, y: 4.5, "font-size": 4, "text-anchor": "middle" }, value);
   element(section, "p", `${limit > 0 ? "dashed circle: half the clearance; " : ""}equal scales${compared ? "; dotted: the scene's numbers" : ""}`);

@@ -6,24 +6,33 @@ const get = (id) => document.getElementById(id), slider = get("frame");
 let data, frames, last, across, begin, end, compared = null;
 function use(run) {
   data = run;
-  frames = data.time.values.map((_, k) => k);
+  frames = all(data.time).map((_, k) => k);
   last = frames.length - 1;
   across = data.turning ? all(data.angle) : all(data.time).map((t) => 1e3 * t);
   [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
 }
-const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
-const all = (signal) => { const unit = 10 ** signal.decimals; return signal.all ??= signal.values.map((value) => value / unit); };
+const all = (signal) => signal.all ??= signal.values.map((value) => value / 10 ** signal.decimals);
+const at = (signal, k) => all(signal)[k];
 const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
 const length = ([x, y]) => Math.sqrt(x * x + y * y); // much faster than Math.hypot
 const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
 const short = (value) => Math.round(1e2 * value) / 1e2; // several times as fast as toFixed
 const joined = (places) => places.map(([x, y]) => short(x) + "," + short(y)).join(" ");
-// The points of a curve; within a stretch of one height there are none.
-function traced(values, places, Y) {
-  const heights = values.map((value) => short(Y(value)));
-  let text = "";
-  for (let k = 0; k < heights.length; k += 1) if (heights[k] !== heights[k - 1] || heights[k] !== heights[k + 1]) text += places[k] + heights[k] + " ";
+// A curve without the points that straight lines between the others pass at less than a twentieth of a unit.
+function traced(xs, ys, near = 0.05) {
+  const point = (k) => short(xs[k]) + "," + short(ys[k]) + " ", end = xs.length - 1;
+  let text = point(0);
+  for (let from = 0, next = 1; from < end; text += point(from), next = from + 1) {
+    // slopes of lines that begin here and pass all points so far
+    let [left, right, below, above] = [-Infinity, Infinity, -Infinity, Infinity];
+    for (; next <= end; next += 1) {
+      const far = next - from, x = (xs[next] - xs[from]) / far, y = (ys[next] - ys[from]) / far, wide = near / far;
+      if (x < left || x > right || y < below || y > above) break;
+      [left, right, below, above] = [Math.max(left, x - wide), Math.min(right, x + wide), Math.max(below, y - wide), Math.min(above, y + wide)];
+    }
+    from = next - 1;
+  }
   return text;
 }
 const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
@@ -79,9 +88,10 @@ function drawLinkage(parts) {
   moves.push(() => { full = []; });
   const unit = 52 / Math.max(parts.high[0] - parts.low[0], parts.high[1] - parts.low[1], 1e-9);
   const middle = [0, 1].map((axis) => (parts.low[axis] + parts.high[axis]) / 2);
-  const place = (number, k) => { const [x, y] = pair(parts.points[number], k); return [unit * (x - middle[0]), unit * (middle[1] - y)]; };
-  parts.points.forEach((_, number) => draw(picture, "polyline", {
-    points: joined(frames.map((k) => place(number, k))), fill: "none", stroke: "var(--soft)", "stroke-width": 0.25, "stroke-dasharray": "1 0.8",
+  const places = parts.points.map(([x, y]) => [all(x).map((value) => unit * (value - middle[0])), all(y).map((value) => unit * (middle[1] - value))]);
+  const place = (number, k) => [places[number][0][k], places[number][1][k]];
+  places.forEach((path) => draw(picture, "polyline", {
+    points: traced(...path), fill: "none", stroke: "var(--soft)", "stroke-width": 0.25, "stroke-dasharray": "1 0.8",
   }));
   for (const { guide, block, direction } of parts.guides) {
     const rails = [-3.5, 3.5].map((side) => [side, draw(picture, "line", ink)]), box = draw(picture, "polygon", { fill: "var(--ring)", ...ink });
@@ -231,7 +241,7 @@ function drawChart(title, unit, curves) {
   const values = curves.map((curve) => all(curve.signal)), olds = curves.filter((curve) => curve.before).map((curve) => all(curve.before));
   const shown = [...values, ...olds], [low, high] = [-highest(shown.map((some) => highest(some.map((one) => -one)))), highest(shown.map(highest))];
   const X = (x) => left + (x - begin) / (end - begin || 1) * (width - left - right), Y = (y) => top + (high - y) / (high - low) * (height - top - below);
-  const places = across.map((x) => short(X(x)) + ",");
+  const places = across.map(X);
   for (const [from, to] of data.windows) {
     for (let turn = Math.floor(begin / 360) - 1; turn * 360 <= end; turn += 1) {
       const [a, b] = [Math.max(from + 360 * turn, begin), Math.min(to + 360 * turn, end)];
@@ -246,19 +256,19 @@ function drawChart(title, unit, curves) {
   for (const x of marks) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
   draw(picture, "text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, data.turning ? `${data.driver} angle [\u00b0]` : "time [ms]");
   olds.forEach((old) => draw(picture, "polyline", {
-    points: traced(old, compared.across.map((x) => short(X(x)) + ","), Y), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
+    points: traced(compared.across.map(X), old.map(Y)), fill: "none", stroke: "var(--soft)", "stroke-width": 1.1, "stroke-dasharray": "2 2",
   }));
   curves.forEach(({ colour = "var(--ink)", wide = 1.5, dashes = "none" }, n) => draw(picture, "polyline", {
-    points: traced(values[n], places, Y), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
+    points: traced(places, values[n].map(Y)), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
   }));
   element(section, "p", [...curves.map((curve) => curve.name), olds.length && "dotted: the scene's numbers", data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
   const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });
   const follow = (event) => {
     const box = picture.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * width;
-    if (event.buttons || event.type === "pointerdown") { stop(); go(nearest((k) => Math.abs(X(across[k]) - x))); }
+    if (event.buttons || event.type === "pointerdown") { stop(); go(nearest((k) => Math.abs(places[k] - x))); }
   };
   for (const kind of ["pointerdown", "pointermove"]) picture.addEventListener(kind, follow);
-  return (k) => set(cursor, { x1: X(across[k]), x2: X(across[k]) });
+  return (k) => set(cursor, { x1: places[k], x2: places[k] });
 }
 
 // ------------------------------------------------------------------------------------------------- numbers and moving
