@@ -27,8 +27,8 @@ from ballpass.runtime.ratings.of_bearing import ratings_of
 
 #: What a page calls; memory for what it reads is the module's.
 CALLED = (
-    *(f"ballpass_{name}" for name in ("make", "value", "set_at", "start", "run_to", "read", "error")),
-    *(f"ballpass_{name}" for name in ("stop", "values", "drawn", "ratings", "next_switch")),
+    *(f"ballpass_{name}" for name in ("make", "value", "set_at", "start", "run_to", "rows", "error")),
+    *(f"ballpass_{name}" for name in ("stop", "values", "ratings", "next_switch")),
     *(f"ballpass_{name}" for name in ("state_size", "save", "restore", "reduce")),
     "malloc",
 )
@@ -82,7 +82,7 @@ def web_assembly(model: LoadedModel) -> bytes:
 
 
 def drawn_columns(manifest: Manifest) -> tuple[int, int, int, int]:
-    """How many numbers `ballpass_drawn` gives: points, angles of cages, these as rings see them, inputs.
+    """How many numbers a row has behind its columns: points, angles of cages, these as rings see them, inputs.
 
     Those of a ring are of ball 1 as the ring sees it: of each bearing the outer, then the inner one.
     """

@@ -180,12 +180,12 @@ function drawLoad(bearing, number) {
 
 // Amplitudes of the rings' motion at whole parts of the record's frequency, as far as 40 a turn; Hann's window where turns hold no whole period.
 function spectrumOf(run, number) {
-  const bearing = solver.bearings[number], turns = run.turn < Infinity ? Math.min(Math.round((run.time(run.count - 1) - run.time(0)) / run.turn), 4) : 0;
-  const size = turns ? Math.round(turns * solver.run.samples) : run.count - 1, from = run.count - 1 - size, lines = Math.min(40 * (turns || 5), Math.floor(size / 2)), hann = !solver.linkage;
-  const motion = Array.from({ length: size }, (_, k) => motionOf(bearing, run.rows.subarray((from + k) * width, (from + k + 1) * width)));
+  const bearing = solver.bearings[number], turns = run.turn < Infinity ? Math.min(Math.round((run.rows.at(-1)[0] - run.rows[0][0]) / run.turn), 4) : 0;
+  const size = turns ? Math.round(turns * solver.run.samples) : run.rows.length - 1, from = run.rows.length - 1 - size, lines = Math.min(40 * (turns || 5), Math.floor(size / 2)), hann = !solver.linkage;
+  const motion = run.rows.slice(from, from + size).map((row) => motionOf(bearing, row));
   const middle = [0, 1].map((axis) => motion.reduce((sum, one) => sum + one[axis], 0) / size);
   const [xs, ys] = [0, 1].map((axis) => Float64Array.from(motion, (one, k) => (one[axis] - middle[axis]) * (hann ? 1 - Math.cos(TURN * k / size) : 1)));
-  const step = 1 / (size * (run.time(1) - run.time(0)));
+  const step = run.parts / (size * run.whole);
   return Array.from({ length: lines }, (_, n) => {
     const turnBy = TURN * (n + 1) / size, [c, s] = [Math.cos(turnBy), Math.sin(turnBy)];
     let re = 1, im = 0, xr = 0, xi = 0, yr = 0, yi = 0;
@@ -239,6 +239,7 @@ async function work() {
       const warned = warningsOf(run), results = resultsOf(run), solved = performance.now();
       run.results = results;
       scene ??= run;
+      if (current && current !== scene) spare.push(...current.blocks);
       current = run;
       const same = values.every((value, k) => value === own[k]), drawn = drawnOf(run);
       if (scene === run) scene.drawn = drawn;
@@ -283,7 +284,7 @@ get("lines").addEventListener("click", (event) => hand([`ballpass run ${solver.s
 get("csv").addEventListener("click", () => {
   if (!current) return;
   const count = solver.columns.length, text = [solver.columns.map((name, k) => `${name} [${solver.units[k]}]`).join(",")];
-  for (let k = 0; k < current.count; k += 1) text.push(current.rows.subarray(k * width, k * width + count).join(","));
+  for (const row of current.rows) text.push(row.subarray(0, count).join(","));
   const link = element(document.body, "a", "", { href: URL.createObjectURL(new Blob([text.join("\n"), "\n"], { type: "text/csv" })), download: `${solver.scene}.csv` });
   link.click();
   link.remove();

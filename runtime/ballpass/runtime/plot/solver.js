@@ -5,6 +5,7 @@ const solver = numbers.solver, width = solver.columns.length + solver.drawn.redu
 let far = solver.columns.length;
 const [pointsAt, cagesAt, seenAt, inputsAt] = solver.drawn.map((count) => { far += count; return far - count; });
 const TURN = 2 * Math.PI, DEGREE = Math.PI / 180;
+const BLOCK = 64; // samples that are read at once
 let machine = null;
 
 async function loadSolver() {
@@ -15,10 +16,11 @@ async function loadSolver() {
   for (const { module: space, name } of WebAssembly.Module.imports(module)) (system[space] ??= {})[name] = () => 52;
   const { exports } = await WebAssembly.instantiate(module, system);
   exports._initialize?.();
-  machine = { ...exports, one: exports.ballpass_make(), row: exports.malloc(8 * width), ratings: exports.malloc(16 * solver.bearings.length + 8), saved: exports.malloc(exports.ballpass_state_size()), reduction: exports.malloc(8 * solver.reduction.size) };
-  if (!machine.one || !machine.row || !machine.ratings || !machine.saved || !machine.reduction) throw new Error("The memory is too small for the solver.");
+  machine = { ...exports, one: exports.ballpass_make(), rows: exports.malloc(8 * (BLOCK + 1) * width), ratings: exports.malloc(16 * solver.bearings.length + 8), saved: exports.malloc(exports.ballpass_state_size()), reduction: exports.malloc(8 * solver.reduction.size) };
+  if (!machine.one || !machine.rows || !machine.ratings || !machine.saved || !machine.reduction) throw new Error("The memory is too small for the solver.");
 }
 
+const savedState = () => new Uint8Array(machine.memory.buffer, machine.saved, machine.ballpass_state_size());
 const inMemory = (place, count) => new Float64Array(machine.memory.buffer, place, count);
 function complaint() {
   const bytes = new Uint8Array(machine.memory.buffer, machine.ballpass_error(machine.one));
@@ -26,12 +28,18 @@ function complaint() {
 }
 const must = (answer) => { if (answer) throw new Error(complaint()); };
 
-let seen = new Float64Array();
-function readRow() {
-  must(machine.ballpass_read(machine.one, machine.row));
-  machine.ballpass_drawn(machine.one, machine.row + 8 * solver.columns.length);
-  if (seen.buffer !== machine.memory.buffer) seen = inMemory(machine.row, width); // memory that grows is another one
-  return seen;
+// Rows at some of the times that divide `whole` into equal parts. Their blocks are used again when a run is not shown any more: to
+// collect megabytes at every move of a slider took as long as the run, and with the garbage went the compiled script.
+const spare = [];
+function makeBlock() {
+  const numbers = new Float64Array((BLOCK + 1) * width);
+  return { numbers, rows: Array.from({ length: BLOCK + 1 }, (_, k) => numbers.subarray(k * width, (k + 1) * width)) };
+}
+function readRows(blocks, whole, parts, first, count) {
+  must(machine.ballpass_rows(machine.one, whole, parts, first, count, width, machine.rows));
+  blocks.push(spare.pop() ?? makeBlock());
+  blocks.at(-1).numbers.set(inMemory(machine.rows, count * width));
+  return blocks.at(-1).rows.slice(0, count);
 }
 
 // A run of these numbers, or null where `stale` says that it is not wanted any more: its steady samples, row after row.
@@ -51,43 +59,34 @@ async function solve(values, stale) {
   reduced[solver.reduction.from] = least * (1 - 1e-9);
   for (const { top, deflection } of solver.bearings) reduced[top.wanted] = reduced[deflection.wanted] = 1;
   machine.ballpass_reduce(machine.one, machine.reduction);
-  const rows = new Float64Array((count - first + 1) * width), jumps = [];
-  const apart = 1e-10 * whole; // closer than this a sample and a switch are one time
-  let next = -1, reached = 0;
-  for (let k = 0; k <= count; k += 1) {
-    if (k > first) { // both sides of every time at which a load switches, for means and peaks
-      if (next < reached) next = machine.ballpass_next_switch(machine.one);
-      while (next < time(k) + apart) {
-        for (const side of [next - apart, next]) {
-          reached = Math.max(side, reached);
-          must(machine.ballpass_run_to(machine.one, reached));
-          jumps.push([k - first, readRow().slice()]);
-        }
-        next = machine.ballpass_next_switch(machine.one);
+  const blocks = [], rows = [], nodes = [], states = [], apart = 1e-10 * whole; // closer than this a sample and a switch are one time
+  for (let k = 0, end = 0; k <= count; k = end) {
+    if (k < first) {
+      end = Math.min(k + BLOCK, first);
+      must(machine.ballpass_run_to(machine.one, time(end)));
+    } else {
+      const next = machine.ballpass_next_switch(machine.one);
+      end = Math.min(k + BLOCK, count + 1);
+      while (end > k && time(end - 1) + apart > next) end -= 1;
+      if (k >= first + 8 * BLOCK * states.length) {
+        machine.ballpass_save(machine.one, machine.saved);
+        states.push([k, savedState().slice()]);
       }
+      const block = end > k ? readRows(blocks, whole, count, k, end - k) : [next - apart, next].flatMap((side) => readRows(blocks, side, 1, 1, 1));
+      nodes.push(...block); // also both sides of every time at which a load switches, for means and peaks
+      if (end > k) rows.push(...block);
     }
-    if (k >= first || k % 32 === 0) {
-      reached = Math.max(time(k), reached);
-      must(machine.ballpass_run_to(machine.one, reached));
-    }
-    if (k === first) machine.ballpass_save(machine.one, machine.saved);
-    if (k >= first) rows.set(readRow(), (k - first) * width);
-    if (k % 32 === 0 && performance.now() - began > 40) { // the page stays alive
+    if (performance.now() - began > 40) { // the page stays alive
       await new Promise((go) => { setTimeout(go); });
       if (stale()) return null;
       began = performance.now();
     }
   }
-  const nodes = [];
-  for (let k = 0, jump = 0; k <= count - first; k += 1) {
-    for (; jump < jumps.length && jumps[jump][0] === k; jump += 1) nodes.push(jumps[jump][1]);
-    nodes.push(rows.subarray(k * width, (k + 1) * width));
-  }
   machine.ballpass_ratings(machine.one, machine.ratings);
   machine.ballpass_reduce(machine.one, 0);
-  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), row = inMemory(machine.reduction, solver.reduction.size);
-  const tops = solver.bearings.map(({ top }) => ({ value: row[top.max], time: row[top.max_time] })), deflections = solver.bearings.map(({ deflection }) => row[deflection.max]);
-  return { values, known, ratings, tops, deflections, rows, jumps, nodes, turn, speed, count: count - first + 1, time: (k) => time(k + first) };
+  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), found = inMemory(machine.reduction, solver.reduction.size);
+  const tops = solver.bearings.map(({ top }) => ({ value: found[top.max], time: found[top.max_time] })), deflections = solver.bearings.map(({ deflection }) => found[deflection.max]);
+  return { values, known, ratings, tops, deflections, blocks, rows, nodes, states, turn, speed, whole, first, parts: count };
 }
 
 // Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.
@@ -145,34 +144,23 @@ function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, we
 
 // Highest values of measures of a sample, between samples too: the steps do not depend on what is read.
 function peaks(run, measures, series) {
-  const FINE = 32, [start, step] = [run.time(0), (run.time(run.count - 1) - run.time(0)) / ((run.count - 1) * FINE)];
-  const found = series.map((values) => {
-    const top = values.reduce((best, value, k) => (value > values[best] ? k : best), 0), time = run.nodes[top][0];
-    return { value: values[top], time, sample: Math.round((time - start) / (FINE * step)), fine: [] };
-  });
-  const asked = new Set(found.flatMap(({ sample }) => Array.from({ length: 2 * FINE + 1 }, (_, n) => (sample - 1) * FINE + n)));
-  const places = [...asked].filter((n) => n >= 0 && n <= (run.count - 1) * FINE).sort((a, b) => a - b);
-  must(machine.ballpass_restore(machine.one, machine.saved, machine.ballpass_state_size()));
-  for (const n of places) {
-    must(machine.ballpass_run_to(machine.one, n % FINE ? start + n * step : run.time(n / FINE)));
-    const here = readRow();
-    found.forEach((one, k) => { if (Math.abs(n - one.sample * FINE) <= FINE) one.fine.push([n, measures[k](here)]); });
-  }
-  for (const one of found) {
-    const top = one.fine.reduce((best, now, k) => (now[1] > one.fine[best][1] ? k : best), 0), [a, b, c] = [top - 1, top, top + 1].map((k) => one.fine[k]?.[1]);
+  const FINE = BLOCK / 2, { whole, parts, first, nodes, states } = run, topOf = (values) => values.reduce((best, value, k) => (value > values[best] ? k : best), 0);
+  return measures.map((measure, k) => {
+    const node = topOf(series[k]), from = Math.max(Math.round(nodes[node][0] / whole * parts) - 1, first);
+    savedState().set(states.findLast(([sample]) => sample <= from)[1]);
+    must(machine.ballpass_restore(machine.one, machine.saved, savedState().length));
+    const fine = readRows(spare, whole, parts * FINE, from * FINE, Math.min(2, parts - from) * FINE + 1).map(measure), top = topOf(fine), [a, b, c] = [fine[top - 1], fine[top], fine[top + 1]];
     // the parabola through three neighbours, where they are: not across a jump
     const bend = a - 2 * b + c, smooth = bend < 0 && 2 * b - a - c < 1e-3 * Math.abs(b), way = smooth ? 0.5 * (a - c) / bend : 0;
     const value = smooth ? b - 0.25 * (a - c) * way : b;
-    if (value > one.value) [one.value, one.time] = [value, start + (one.fine[top][0] + way) * step];
-  }
-  return found;
+    return value > series[k][node] ? { value, time: whole * ((from * FINE + top + way) / (parts * FINE)) } : { value: series[k][node], time: nodes[node][0] };
+  });
 }
 
 // ---------------------------------------------------------------------------------------------------- from run to page
 const greatest = (values, most = 1e-12) => values.reduce((found, value) => Math.max(found, Math.abs(value)), most);
 const signalOf = (values, most = greatest(values)) => {
-  const decimals = most > 1e-12 ? 4 - Math.floor(Math.log10(most)) : 0, unit = 10 ** decimals;
-  return { decimals, values: values.map((value) => value * unit) };
+  return { decimals: most > 1e-12 ? 4 - Math.floor(Math.log10(most)) : 0, all: values };
 };
 // Signals of one kind have the same decimals.
 const signalsOf = (columns) => { const most = columns.reduce((found, values) => greatest(values, found), 1e-12); return columns.map((values) => signalOf(values, most)); };
@@ -189,11 +177,11 @@ function interpolated(angle, knots, heights, period) {
   return heights[n - 1] + (heights[n % knots.length] - heights[n - 1]) * (turned - a) / (b - a);
 }
 
-function forceOf(run, source, row, points) {
+function forceOf(run, source, row, placeOf) {
   const value = (place) => run.known[place];
   if (source.columns) return source.columns.map((column) => source.sign * row[column]);
   if (source.between) {
-    const [from, to] = source.between.map((point) => points[point]), way = [to[0] - from[0], to[1] - from[1]], size = Math.max(length(way), 1e-12);
+    const [from, to] = source.between.map(placeOf), way = [to[0] - from[0], to[1] - from[1]], size = Math.max(length(way), 1e-12);
     return way.map((part) => source.sign * row[source.tension] * part / size);
   }
   let amount = 1;
@@ -222,7 +210,7 @@ const general = (value, digits) => {
 const filled = (words, given) => words.replace(/\{(\w+):\.(\d)g\}/g, (_, name, digits) => general(given[name], Number(digits)));
 
 // What `ballpass run` warns of: numbers outside of their usual ranges, results that no real bearing shows. An error where these mean nothing.
-function warningsOf({ known, rows, count, deflections }) {
+function warningsOf({ known, rows, deflections }) {
   const said = solver.usual.flatMap(({ at, of, each, least, most, words }) => {
     const values = at.map((place) => known[place]), total = values.reduce((sum, value) => sum + value), scale = of === null ? 1 : Math.abs(known[of]);
     const odd = each ? values.every((value) => value > 0 && value < least) : (least !== null && total < least * scale) || (most !== null && total > most * scale);
@@ -237,7 +225,7 @@ function warningsOf({ known, rows, count, deflections }) {
     };
     check(deflections[k], deflections[k] + half); // of every step
     let displaced = 0; // of the samples, as the summary of a run has it
-    for (let n = 0; n < count; n += 1) displaced = Math.max(displaced, 1e-6 * length(motionOf(bearing, rows.subarray(n * width, (n + 1) * width))));
+    for (const row of rows) displaced = Math.max(displaced, 1e-6 * length(motionOf(bearing, row)));
     const deflection = (cosine === null ? 1 : known[cosine]) * (displaced - (gap === null ? half : known[gap]));
     check(deflection, displaced);
     if (deflection > solver.limits.deflected * ball) said.push(words("deflected", deflection, displaced));
@@ -247,34 +235,34 @@ function warningsOf({ known, rows, count, deflections }) {
 
 // What the pictures show of a run, its last turn or cycle of turns, in the form in which the page brings the scene's own.
 function drawnOf(run) {
-  const row = (k) => run.rows.subarray(k * width, (k + 1) * width), angles = Array.from({ length: run.count }, (_, k) => angleOf(run, row(k)));
-  const sense = Math.sign(angles[run.count - 1] - angles[0]), turning = sense !== 0 && angles.every((angle, k) => !k || sense * (angle - angles[k - 1]) > 0);
+  const end = run.rows.length - 1, angles = run.rows.map((row) => angleOf(run, row));
+  const sense = Math.sign(angles[end] - angles[0]), turning = sense !== 0 && angles.every((angle, k) => !k || sense * (angle - angles[k - 1]) > 0);
   let begins = 0;
-  if (turning) while (begins + 1 < run.count && Math.abs(angles[run.count - 1] - angles[begins + 1]) >= TURN * solver.shown * (1 - 1e-9)) begins += 1;
+  if (turning) while (begins < end && Math.abs(angles[end] - angles[begins + 1]) >= TURN * solver.shown * (1 - 1e-9)) begins += 1;
   // every bearing's highest force is among the positions
   const tops = solver.bearings.map((bearing) => {
     let [most, top] = [-Infinity, begins];
-    for (let k = begins; k < run.count; k += 1) for (const column of bearing.force) if (run.rows[k * width + column] > most) [most, top] = [run.rows[k * width + column], k];
+    for (let k = begins; k <= end; k += 1) for (const column of bearing.force) if (run.rows[k][column] > most) [most, top] = [run.rows[k][column], k];
     return [most, top];
-  }), stride = Math.ceil((run.count - begins - 1) / 1000), chosen = [];
-  for (let k = begins; k < run.count; k += 1) if ((k - begins) % stride === 0 || k === run.count - 1 || tops.some((top) => top[1] === k)) chosen.push(k);
+  }), stride = Math.ceil((end - begins) / 1000), chosen = [];
+  for (let k = begins; k <= end; k += 1) if ((k - begins) % stride === 0 || k === end || tops.some((top) => top[1] === k)) chosen.push(k);
   const peak = tops.length ? tops.reduce((best, top) => (top[0] > best[0] ? top : best))[1] : begins;
-  const rows = chosen.map(row), shift = 360 * Math.floor(Math.min(...chosen.map((k) => angles[k])) / TURN + 1e-9);
-  const fresh = { ...numbers, turning, peak: chosen.indexOf(peak), time: { decimals: 7, values: rows.map((one) => 1e7 * one[0]) } };
-  fresh.angle = numbers.angle && { decimals: 3, values: chosen.map((k) => 1e3 * (angles[k] / DEGREE - shift)) };
+  const rows = chosen.map((k) => run.rows[k]), shift = 360 * Math.floor(Math.min(...chosen.map((k) => angles[k])) / TURN + 1e-9);
+  const fresh = { ...numbers, turning, peak: chosen.indexOf(peak), time: { decimals: 7, all: rows.map((one) => one[0]) } };
+  fresh.angle = numbers.angle && { decimals: 3, all: chosen.map((k) => angles[k] / DEGREE - shift) };
   fresh.windows = turning ? solver.windows.map((edges) => edges.map((place) => run.known[place] / DEGREE)).map(([from, to]) => {
     const first = ((from % 360) + 360) % 360;
     return [first, first + (((to - from) % 360) + 360) % 360];
   }) : [];
   fresh.torque = solver.torque === null ? null : signalOf(rows.map((one) => one[solver.torque]));
   if (solver.linkage) {
-    const places = rows.map((one) => solver.linkage.points.map((point) => [one[pointsAt + 2 * point], one[pointsAt + 2 * point + 1]]));
+    const paths = solver.linkage.points.map((point) => [0, 1].map((axis) => rows.map((one) => one[pointsAt + 2 * point + axis])));
     const corners = numbers.linkage.bodies.flatMap((body) => body.points).concat(numbers.linkage.names.map((name) => name.at));
-    const ends = (pick) => [0, 1].map((axis) => places.reduce((sum, now) => corners.reduce((best, point) => pick(best, now[point][axis]), sum), places[0][corners[0]][axis]));
+    const ends = (pick) => [0, 1].map((axis) => pick(...corners.map((point) => pick(...paths[point][axis]))));
     fresh.linkage = { ...numbers.linkage, low: ends(Math.min), high: ends(Math.max),
-      points: solver.linkage.points.map((_, point) => signalsOf([0, 1].map((axis) => places.map((now) => now[point][axis])))),
+      points: paths.map(signalsOf),
       forces: numbers.linkage.forces.map((force, k) => {
-        const parts = rows.map((one, n) => forceOf(run, solver.linkage.forces[k], one, places[n])), [x, y] = signalsOf([0, 1].map((axis) => parts.map((part) => part[axis])));
+        const parts = rows.map((one, n) => forceOf(run, solver.linkage.forces[k], one, (point) => paths[point].map((axis) => axis[n]))), [x, y] = signalsOf([0, 1].map((axis) => parts.map((part) => part[axis])));
         return { ...force, x, y };
       }) };
   }
@@ -285,7 +273,7 @@ function drawnOf(run) {
     const ends = bearing.load && rows.map((one) => loadOf(run, bearing.load, one));
     return { ...numbers.bearings[k], pitch: run.known[bearing.pitch], ball, clearance,
       factor: Math.max(1, decade * Math.max(...[1, 2, 5].filter((digit) => digit * decade <= share))),
-      ball_angle: { decimals: 3, values: first.map((angle) => 1e3 * (angle - whole)) },
+      ball_angle: { decimals: 3, all: first.map((angle) => angle - whole) },
       force: signalsOf(bearing.force.map((column) => rows.map((one) => one[column]))),
       inner: signalsOf([0, 1].map((axis) => moved.map((pairs) => pairs[axis]))),
       outer: bearing.outer && numbers.bearings[k].outer ? signalsOf(bearing.outer.map((column) => rows.map((one) => 1e6 * one[column]))) : null,

@@ -2,7 +2,7 @@
 
 In: the manifest and the plain numbers of `animation.to_plain`, which name what is drawn.  Out: plain numbers for JSON.
 
-A sample of ``ballpass_read`` has the columns of `columns_of`; ``ballpass_drawn`` gives points, cage angles and inputs.
+A row of ``ballpass_rows`` has the columns of `columns_of`, then points, cage angles and inputs.
 Numbers are named by their place among parameters and, behind these, derived constants.
 """
 
