@@ -18,27 +18,22 @@ static const double bp_has_rate[8] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
 static inline void bp_0_switches_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
 {
     (void)k;
-    const double r_0 = r[0];
-    const double r_1 = r[1];
-    const double r_2 = r[2];
-    const double r_3 = r[3];
-    const double r_4 = r[4];
+    const double s0 = r[0];
+    const double s1 = r[1];
+    const double s5 = r[2];
+    const double s10 = r[3];
+    const double s12 = r[4];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
-        double w0 = r_0;
-        double w1 = r_1;
         double w2 = co[0 * BP_0_BALLS + lane];
-        w1 = w1 * w2;
-        w0 = w0 + w1;
-        w1 = r_2;
+        double w1 = s1 * w2;
+        double w0 = s0 + w1;
         double w3 = si[0 * BP_0_BALLS + lane];
-        w1 = w1 * w3;
+        w1 = s5 * w3;
         w0 = w0 + w1;
         rows[0 * BP_0_BALLS + lane] = w0;
-        w0 = r_3;
-        w0 = w0 * w2;
-        w2 = r_4;
-        w2 = w2 * w3;
+        w0 = s10 * w2;
+        w2 = s12 * w3;
         w0 = w0 + w2;
         rows[1 * BP_0_BALLS + lane] = w0;
     }
@@ -47,42 +42,35 @@ static inline void bp_0_switches_lanes(const double *restrict co, const double *
 /* Summands of the forces, sides held. 20 operations a ball. */
 static inline void bp_0_held_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
-    const double r_3 = r[3];
-    const double r_4 = r[4];
-    const double k_1 = k[1];
-    const double r_0 = r[0];
-    const double r_1 = r[1];
-    const double r_2 = r[2];
-    const double k_0 = k[0];
+    const double s0 = 0.0;
+    const double s1 = r[3];
+    const double s4 = r[4];
+    const double s9 = k[1];
+    const double s12 = r[0];
+    const double s13 = r[1];
+    const double s16 = r[2];
+    const double s23 = k[0];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
-        double w0 = 0.0;
-        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
-        w1 = w1 * w2;
-        double w3 = r_4;
+        double w1 = s1 * w2;
         double w4 = si[0 * BP_0_BALLS + lane];
-        w3 = w3 * w4;
+        double w3 = s4 * w4;
         w1 = w1 + w3;
-        w3 = (double)(w0 < w1);
-        double w5 = k_1;
-        w1 = w1 * w5;
+        w3 = (double)(s0 < w1);
+        w1 = w1 * s9;
         w3 = (w3 != 0.0 ? w1 : 0.0);
-        w1 = r_0;
-        w5 = r_1;
-        w5 = w5 * w2;
+        double w5 = s13 * w2;
+        w1 = s12 + w5;
+        w5 = s16 * w4;
         w1 = w1 + w5;
-        w5 = r_2;
-        w5 = w5 * w4;
-        w1 = w1 + w5;
-        w0 = (double)(w0 < w1);
+        double w0 = (double)(s0 < w1);
         w5 = b[0 * BP_0_BALLS + lane];
         w5 = (double)(w5 < w1);
         w0 = (double)(w0 * w5 != 0.0);
-        w5 = k_0;
         double w6 = sqrt(w1);
         w1 = w1 * w6;
-        w5 = w5 * w1;
+        w5 = s23 * w1;
         w0 = (w0 != 0.0 ? w5 : 0.0);
         w3 = w3 + w0;
         w2 = w3 * w2;
@@ -95,51 +83,43 @@ static inline void bp_0_held_forces_lanes(const double *restrict co, const doubl
 /* The same, and of their slopes. 36 operations a ball. */
 static inline void bp_0_held_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
-    const double r_3 = r[3];
-    const double r_4 = r[4];
-    const double k_1 = k[1];
-    const double r_0 = r[0];
-    const double r_1 = r[1];
-    const double r_2 = r[2];
-    const double k_0 = k[0];
-    const double k_2 = k[2];
+    const double s0 = 0.0;
+    const double s1 = r[3];
+    const double s4 = r[4];
+    const double s9 = k[1];
+    const double s12 = r[0];
+    const double s13 = r[1];
+    const double s16 = r[2];
+    const double s23 = k[0];
+    const double s33 = k[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
-        double w0 = 0.0;
-        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
-        w1 = w1 * w2;
-        double w3 = r_4;
+        double w1 = s1 * w2;
         double w4 = si[0 * BP_0_BALLS + lane];
-        w3 = w3 * w4;
+        double w3 = s4 * w4;
         w1 = w1 + w3;
-        w3 = (double)(w0 < w1);
-        double w5 = k_1;
-        w1 = w1 * w5;
+        w3 = (double)(s0 < w1);
+        w1 = w1 * s9;
         w1 = (w3 != 0.0 ? w1 : 0.0);
-        double w6 = r_0;
-        double w7 = r_1;
-        w7 = w7 * w2;
+        double w7 = s13 * w2;
+        double w6 = s12 + w7;
+        w7 = s16 * w4;
         w6 = w6 + w7;
-        w7 = r_2;
-        w7 = w7 * w4;
-        w6 = w6 + w7;
-        w0 = (double)(w0 < w6);
+        double w0 = (double)(s0 < w6);
         w7 = b[0 * BP_0_BALLS + lane];
         w7 = (double)(w7 < w6);
         w0 = (double)(w0 * w7 != 0.0);
-        w7 = k_0;
         double w8 = sqrt(w6);
         w6 = w6 * w8;
-        w7 = w7 * w6;
+        w7 = s23 * w6;
         w7 = (w0 != 0.0 ? w7 : 0.0);
         w1 = w1 + w7;
         w7 = w1 * w2;
         rows[0 * BP_0_BALLS + lane] = w7;
         w1 = w1 * w4;
         rows[1 * BP_0_BALLS + lane] = w1;
-        w1 = k_2;
-        w1 = w1 * w8;
+        w1 = s33 * w8;
         w8 = w2 * w2;
         w7 = w1 * w8;
         w7 = (w0 != 0.0 ? w7 : 0.0);
@@ -152,13 +132,13 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
         w1 = w1 * w4;
         w0 = (w0 != 0.0 ? w1 : 0.0);
         rows[4 * BP_0_BALLS + lane] = w0;
-        w8 = w5 * w8;
+        w8 = s9 * w8;
         w8 = (w3 != 0.0 ? w8 : 0.0);
         rows[5 * BP_0_BALLS + lane] = w8;
-        w2 = w5 * w2;
+        w2 = s9 * w2;
         w2 = (w3 != 0.0 ? w2 : 0.0);
         rows[6 * BP_0_BALLS + lane] = w2;
-        w5 = w5 * w4;
+        double w5 = s9 * w4;
         w3 = (w3 != 0.0 ? w5 : 0.0);
         rows[7 * BP_0_BALLS + lane] = w3;
     }
@@ -167,51 +147,43 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
 /* The same, and derivatives of the forces by the ball's angle, by r0 and by k. 76 operations a ball. */
 static inline void bp_0_held_partials_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
-    const double r_3 = r[3];
-    const double r_4 = r[4];
-    const double k_1 = k[1];
-    const double r_0 = r[0];
-    const double r_1 = r[1];
-    const double r_2 = r[2];
-    const double k_0 = k[0];
-    const double k_2 = k[2];
+    const double s0 = 0.0;
+    const double s1 = r[3];
+    const double s4 = r[4];
+    const double s9 = k[1];
+    const double s12 = r[0];
+    const double s13 = r[1];
+    const double s16 = r[2];
+    const double s23 = k[0];
+    const double s33 = k[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
-        double w0 = 0.0;
-        double w1 = r_3;
         double w2 = co[0 * BP_0_BALLS + lane];
-        double w3 = w1 * w2;
-        double w4 = r_4;
+        double w3 = s1 * w2;
         double w5 = si[0 * BP_0_BALLS + lane];
-        double w6 = w4 * w5;
+        double w6 = s4 * w5;
         w3 = w3 + w6;
-        w6 = (double)(w0 < w3);
-        double w7 = k_1;
-        double w8 = w3 * w7;
+        w6 = (double)(s0 < w3);
+        double w8 = w3 * s9;
         w8 = (w6 != 0.0 ? w8 : 0.0);
-        double w9 = r_0;
-        double w10 = r_1;
-        double w11 = w10 * w2;
-        w9 = w9 + w11;
-        w11 = r_2;
-        double w12 = w11 * w5;
+        double w11 = s13 * w2;
+        double w9 = s12 + w11;
+        double w12 = s16 * w5;
         w9 = w9 + w12;
-        w12 = (double)(w0 < w9);
+        w12 = (double)(s0 < w9);
         double w13 = b[0 * BP_0_BALLS + lane];
         w13 = (double)(w13 < w9);
         w12 = (double)(w12 * w13 != 0.0);
-        w13 = k_0;
         double w14 = sqrt(w9);
         double w15 = w9 * w14;
-        double w16 = w13 * w15;
+        double w16 = s23 * w15;
         w16 = (w12 != 0.0 ? w16 : 0.0);
         w8 = w8 + w16;
         w16 = w8 * w2;
         rows[0 * BP_0_BALLS + lane] = w16;
         w8 = w8 * w5;
         rows[1 * BP_0_BALLS + lane] = w8;
-        double w17 = k_2;
-        w17 = w17 * w14;
+        double w17 = s33 * w14;
         double w18 = w2 * w2;
         double w19 = w17 * w18;
         w19 = (w12 != 0.0 ? w19 : 0.0);
@@ -224,22 +196,22 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         w17 = w17 * w20;
         w17 = (w12 != 0.0 ? w17 : 0.0);
         rows[4 * BP_0_BALLS + lane] = w17;
-        w18 = w7 * w18;
+        w18 = s9 * w18;
         w18 = (w6 != 0.0 ? w18 : 0.0);
         rows[5 * BP_0_BALLS + lane] = w18;
-        w19 = w7 * w19;
+        w19 = s9 * w19;
         w19 = (w6 != 0.0 ? w19 : 0.0);
         rows[6 * BP_0_BALLS + lane] = w19;
-        w20 = w7 * w20;
+        w20 = s9 * w20;
         w20 = (w6 != 0.0 ? w20 : 0.0);
         rows[7 * BP_0_BALLS + lane] = w20;
-        w4 = w4 * w2;
-        w1 = w1 * w5;
+        double w4 = s4 * w2;
+        double w1 = s1 * w5;
         w4 = w4 - w1;
-        w7 = w7 * w4;
+        double w7 = s9 * w4;
         w7 = (w6 != 0.0 ? w7 : 0.0);
-        w11 = w11 * w2;
-        w10 = w10 * w5;
+        w11 = s16 * w2;
+        double w10 = s13 * w5;
         w11 = w11 - w10;
         w10 = w14 * w11;
         w4 = 2.0 * w14;
@@ -247,7 +219,7 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         w11 = w11 * i0;
         w11 = w9 * w11;
         w10 = w10 + w11;
-        w10 = w13 * w10;
+        w10 = s23 * w10;
         w10 = (w12 != 0.0 ? w10 : 0.0);
         w7 = w7 + w10;
         w10 = w2 * w7;
@@ -256,14 +228,14 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         w7 = w5 * w7;
         w7 = w7 + w16;
         rows[9 * BP_0_BALLS + lane] = w7;
-        w7 = w13 * w2;
+        w7 = s23 * w2;
         w16 = w14 * w7;
         w7 = w9 * w7;
         w7 = w7 * i0;
         w16 = w16 + w7;
         w16 = (w12 != 0.0 ? w16 : 0.0);
         rows[10 * BP_0_BALLS + lane] = w16;
-        w13 = w13 * w5;
+        w13 = s23 * w5;
         w14 = w14 * w13;
         w9 = w9 * w13;
         w9 = w9 * i0;
@@ -282,8 +254,8 @@ static inline void bp_0_held_partials_lanes(const double *restrict co, const dou
         w5 = w5 * w3;
         w6 = (w6 != 0.0 ? w5 : 0.0);
         rows[15 * BP_0_BALLS + lane] = w6;
-        rows[16 * BP_0_BALLS + lane] = w0;
-        rows[17 * BP_0_BALLS + lane] = w0;
+        rows[16 * BP_0_BALLS + lane] = s0;
+        rows[17 * BP_0_BALLS + lane] = s0;
     }
 }
 
@@ -292,27 +264,23 @@ static inline void bp_0_switches_moved_lanes(const double *restrict co, const do
 {
     (void)k;
     (void)k_d;
-    const double co_0 = co[0];
-    const double r_1 = r[1];
-    const double si_0 = si[0];
-    const double r_2 = r[2];
+    const double s1 = co[0];
+    const double s4 = r[1];
+    const double s9 = si[0];
+    const double s12 = r[2];
 #pragma omp simd
     for (int lane = 0; lane < BP_LANES; lane++) {
         double w0 = r_d[0 * BP_LANES + lane];
-        double w1 = co_0;
         double w2 = r_d[1 * BP_LANES + lane];
-        w1 = w1 * w2;
-        w2 = r_1;
+        double w1 = s1 * w2;
         double w3 = co_d[0 * BP_LANES + lane];
-        w2 = w2 * w3;
+        w2 = s4 * w3;
         w1 = w1 + w2;
         w0 = w0 + w1;
-        w1 = si_0;
         w2 = r_d[2 * BP_LANES + lane];
-        w1 = w1 * w2;
-        w2 = r_2;
+        w1 = s9 * w2;
         w3 = si_d[0 * BP_LANES + lane];
-        w2 = w2 * w3;
+        w2 = s12 * w3;
         w1 = w1 + w2;
         w0 = w0 + w1;
         g_d[0 * BP_LANES + lane] = w0;

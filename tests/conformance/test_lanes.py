@@ -153,6 +153,7 @@ def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of: 
         ("punching_press", driver_library.LOCATING),
         ("punching_press", driver_library.DIFFERENTIATING_LOCATED),
         ("punching_press_tangent", driver_library.DIFFERENTIATING_LOCATED),
+        ("punching_press_roller", driver_library.DIFFERENTIATING_LOCATED),
         ("punching_press_roller", driver_library.LOCATING),
         ("punching_press_roller", driver_library.PLAIN),
         ("punching_press_roller", driver_library.ENSEMBLE),

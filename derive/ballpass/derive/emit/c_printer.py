@@ -15,7 +15,7 @@ import casadi as ca
 #: Largest denominator of an exponent that is taken for a fraction; `driver/powers.h` has roots so high.
 HIGHEST_ROOT = 12
 
-_UNARY = {
+_TEXTS = {
     ca.OP_NEG: "-{0}",
     ca.OP_NOT: "!{0}",
     ca.OP_SQ: "{0} * {0}",
@@ -35,8 +35,6 @@ _UNARY = {
     ca.OP_FLOOR: "floor({0})",
     ca.OP_FABS: "fabs({0})",
     ca.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
-}
-_BINARY = {
     ca.OP_ADD: "{0} + {1}",
     ca.OP_SUB: "{0} - {1}",
     ca.OP_MUL: "{0} * {1}",
@@ -94,53 +92,63 @@ def print_function(
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
     name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
     lines = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
-    lines += _unused(function)
-    head = len(lines)
+    head = [*lines, *_unused(function)]
+    body: list[str] = []
     if lanes:
-        lines += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
+        body += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
     indent = "        " if lanes else "    "
     declared: set[int] = set()
     inverses = _shared_divisors(function)
     exponents, silent = _fractional_exponents(function)
+    #: of each register, what holds its present value; in lanes what all share is computed before the loop: a choice
+    #: that all lanes share, or a number that only one side of a choice loads, keep gcc from making vectors
+    held: dict[int, str] = {}
+    shared: set[str] = set()
     for k in range(function.n_instructions()):
         operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if k in silent:
             continue
         if operation == ca.OP_OUTPUT:
             place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
-            lines.append(f"{indent}{function.name_out(out[0])}[{place}] = w{take[0]};")
+            body.append(f"{indent}{function.name_out(out[0])}[{place}] = {held[take[0]]};")
             continue
+        same = bool(lanes)
+        taken: list[str] = []
         if operation == ca.OP_INPUT:
             name = function.name_in(take[0])
             place = str(take[1])
             if lanes and name in varying:
-                place = f"{take[1]} * {lanes} + lane"
+                place, same = f"{take[1]} * {lanes} + lane", False
             elif lanes and name in strided:
                 place = f"{take[1]} * {lanes}"
             text = name if name in by_value else f"{name}[{place}]"
-            if lanes and name not in varying | by_value:
-                # loaded before the loop: gcc makes no vectors of loops that load such a number only in some lanes
-                lines.insert(head, f"    const double {name}_{take[1]} = {text};")
-                head, text = head + 1, f"{name}_{take[1]}"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))
-        elif k in exponents:
-            text = f"bp_power(w{take[0]}, {exponents[k].numerator}, {exponents[k].denominator})"
-        elif k in inverses:
-            name, first = inverses[k]
-            if first:
-                lines.append(f"{indent}const double {name} = 1.0 / w{take[1]};")
-            text = f"w{take[0]} * {name}"
-        elif operation in _UNARY:
-            text = _UNARY[operation].format(f"w{take[0]}")
-        elif operation in _BINARY:
-            text = _BINARY[operation].format(f"w{take[0]}", f"w{take[1]}")
         else:
-            raise TypeError(f"{function.name()}: operation {operation} has no C text")
-        lines.append(f"{indent}{'' if out[0] in declared else 'double '}w{out[0]} = {text};")
-        declared.add(out[0])
-    lines += ["    }", "}"] if lanes else ["}"]
-    return "\n".join(lines)
+            taken = [held[place] for place in (take[:1] if k in exponents else take)]
+            same = same and shared.issuperset(taken)
+            if k in exponents:
+                text = f"bp_power({taken[0]}, {exponents[k].numerator}, {exponents[k].denominator})"
+            elif k in inverses:
+                name, first = inverses[k]
+                if first and taken[1] in shared:
+                    head.append(f"    const double {name} = 1.0 / {taken[1]};")
+                elif first:
+                    body.append(f"{indent}const double {name} = 1.0 / {taken[1]};")
+                text = f"{taken[0]} * {name}"
+            elif operation in _TEXTS:
+                text = _TEXTS[operation].format(*taken)
+            else:
+                raise TypeError(f"{function.name()}: operation {operation} has no C text")
+        if same:
+            held[out[0]] = f"s{k}"
+            shared.add(f"s{k}")
+            head.append(f"    const double s{k} = {text};")
+        else:
+            held[out[0]] = f"w{out[0]}"
+            body.append(f"{indent}{'' if out[0] in declared else 'double '}w{out[0]} = {text};")
+            declared.add(out[0])
+    return "\n".join([*head, *body, *(["    }"] if lanes else []), "}"])
 
 
 def _fractional_exponents(function: ca.Function) -> tuple[dict[int, Fraction], set[int]]:
