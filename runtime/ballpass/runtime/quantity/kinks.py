@@ -50,27 +50,28 @@ def crossings(t: Array, segment: NDArray[np.int_], *signals: Array) -> Array:
     of = np.repeat(np.arange(len(signals)), [len(place) for place in places])
     table = np.stack(signals)
     values, ends = table[of[:, None], rows], np.stack([table[of, found], table[of, found + 1]], axis=1)
-    start, line = np.sign(ends[:, 0]), np.stack([low, high], axis=1)
+    start, cubics = np.sign(ends[:, 0]), _cubics(nodes, values)
+    # a straight line is a cubic without its higher parts
+    cubics[~whole] = 0.0
+    nodes[~whole, 0], cubics[~whole, 0] = low[~whole], ends[~whole, 0]
+    cubics[~whole, 1] = ((ends[:, 1] - ends[:, 0]) / (high - low))[~whole]
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        straight = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * (middle - line[:, 0]) / (line[:, 1] - line[:, 0])
-        height = np.where(whole, _cubic(nodes, values, middle), straight)
+        height = cubics[:, 3]
+        for k in (2, 1, 0):
+            height = cubics[:, k] + (middle - nodes[:, k]) * height
         left = np.sign(height) == start
         low, high = np.where(left, middle, low), np.where(left, high, middle)
     return np.asarray(0.5 * (low + high))
 
 
-def _cubic(nodes: Array, values: Array, at: Array) -> Array:
-    """Cubics through four nodes each (Lagrange), one value each; equal nodes give numbers that are not used."""
-    total = np.zeros(len(at))
+def _cubics(nodes: Array, values: Array) -> Array:
+    """Cubics through four nodes each (Newton's divided differences); equal nodes give numbers that are not used."""
+    found = values.copy()
     with np.errstate(divide="ignore", invalid="ignore"):
-        for i in range(4):
-            term = values[:, i].copy()
-            for j in range(4):
-                if j != i:
-                    term = term * (at - nodes[:, j]) / (nodes[:, i] - nodes[:, j])
-            total += term
-    return total
+        for k in range(1, 4):
+            found[:, k:] = (found[:, k:] - found[:, k - 1 : -1]) / (nodes[:, k:] - nodes[:, :-k])
+    return found
 
 
 def find_kinks(t: Array, segment: NDArray[np.int_], signals: Array, *, length: float, edges: Array) -> Array:
@@ -84,9 +85,11 @@ def find_kinks(t: Array, segment: NDArray[np.int_], signals: Array, *, length: f
     edges : times that are edges already [s]
     """
     kept: list[float] = []
-    for time in np.sort(crossings(t, segment, *signals.T)).tolist():
-        last = kept[-1] if kept else -np.inf
-        if time - last > APART * length and np.min(np.abs(edges - time)) > APART * length:
+    times = np.sort(crossings(t, segment, *signals.T))
+    behind = np.clip(np.searchsorted(edges, times), 1, len(edges) - 1)
+    free = np.minimum(np.abs(times - edges[behind - 1]), np.abs(edges[behind] - times)) > APART * length
+    for time in times[free].tolist():
+        if not kept or time - kept[-1] > APART * length:
             kept.append(time)
     return np.array(kept)
 
