@@ -174,7 +174,8 @@ def test_count_of_derivatives_is_what_they_take(press: Model, monkeypatch: pytes
 @pytest.mark.parametrize("count", [pytest.param(16, marks=pytest.mark.long), pytest.param(41, marks=pytest.mark.long)])
 def test_count_of_nodes_is_what_a_quantity_takes(press: Model, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     names = list(press.parameters)[:count]
-    quantities = QuantityRun(press, [parse_quantity(press.manifest, "mean:inner.y")], along_nodes=True)
+    asked = [parse_quantity(press.manifest, "mean:inner.y")]
+    quantities = QuantityRun(press, asked, along_nodes=asked)
     run = resolve(press, press.numbers(), Request(cycles=2.0, transient_cycles=0.0, rtol=1e-10, kinks="stepped-over"))
     quantities.differentiate(run, names, 1e-3)  # what is compiled once
     taken = most_memory(lambda: quantities.differentiate(run, names, 1e-3))

@@ -19,6 +19,7 @@ import pytest
 
 from ballpass.runtime import Model
 from ballpass.runtime.many import ensemble
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.show import progress
 from ballpass.runtime.show.progress import shown, shown_steps, silent
 
@@ -138,17 +139,25 @@ def test_a_notebook_gets_a_bar_that_leaves_the_time(monkeypatch: pytest.MonkeyPa
 
 
 def test_an_interrupt_between_the_runs_of_a_call_is_no_result(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second ensemble of a call is interrupted: what it has not run is neither a derivative nor a verdict."""
-    plain, calls = ensemble.run_chunks, []
+    """Differences are interrupted, or the second ensemble: what was not run is neither a derivative nor a verdict."""
+    plain, measure, calls = ensemble.run_chunks, QuantityRun.measure, []
+
+    def interrupted_run(*given: Any) -> EvaluatedQuantities:
+        calls.append(True)
+        if len(calls) == 7:
+            raise KeyboardInterrupt
+        return measure(*given)
 
     def interrupted(*given: Any) -> bool:
         calls.append(plain(*given))
         return len(calls) == 2
 
-    monkeypatch.setattr(ensemble, "run_chunks", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        press.sensitivity("rms:inner.y", "bearing.clearance", cycles=1, transient=0.5)
+    with monkeypatch.context() as patched:
+        patched.setattr(QuantityRun, "measure", interrupted_run)
+        with pytest.raises(KeyboardInterrupt):
+            press.sensitivity("rms:inner.y", "bearing.clearance", cycles=1, transient=0.5)
     calls.clear()
+    monkeypatch.setattr(ensemble, "run_chunks", interrupted)
     table = {"bearing.clearance": [5e-6, 8e-6]}
     found = press.simulate_many(table, "rms:inner.y", cycles=1, transient=0.5, growth=True)
     assert found.interrupted

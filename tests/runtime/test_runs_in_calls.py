@@ -22,10 +22,13 @@ from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import End, Outcome, Stepper
 from ballpass.runtime.run import driver_angle, limits, loop
-from ballpass.runtime.run.loop import RunFailed, RunUnderWay
+from ballpass.runtime.run.locating import stepper_for
+from ballpass.runtime.run.loop import KeptSteps, RunFailed, RunUnderWay, Samples, segments_of, start_run
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.segments import make_segments, segment_edges
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.segments import make_segments, segment_edges, time_resolution
 
 ModelMaker = Callable[..., Model]
 CLEARANCE = "bearing.clearance"
@@ -86,6 +89,26 @@ def test_a_run_has_the_same_bits_however_it_is_cut_into_calls(
         assert outcome == whole
         for ours, theirs in zip(found, expected, strict=True):
             assert np.array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("kinks", ["stepped-over", "located"])
+@pytest.mark.parametrize("method", long_but(STEPPERS, "stepper", "stepper-dop853", "stepper-rodas5p"))
+def test_states_of_kept_steps_are_the_samples_of_the_run_to_the_bit(
+    make_model: ModelMaker, method: str, kinks: Any
+) -> None:
+    """At any times, also at the ends of segments; among them steps over the square root of time."""
+    model = press(make_model, "tangent")
+    run = resolve(model, model.numbers(), Request(cycles=1.5, method=method, kinks=kinks, rtol=1e-7))
+    stepper = stepper_for(model, run.kinks)
+    edges = segments_of(run).times
+    times = np.unique([*np.linspace(run.begin, run.end, 997), *edges])
+    sampled = np.empty((len(times), len(model.states)))
+    near = time_resolution(run.begin, run.end, run.turn)
+    start_run(run, [Samples(times=times, x=sampled, near=near, end=run.end)]).go_on()
+    kept = KeptSteps(numbers=stepper.kept)
+    start_run(run, [kept]).go_on()
+    assert np.array_equal(stepper.read(kept.all, times), sampled)
+    assert np.any(kept.all[:, 1]) == (kinks == "located")
 
 
 @pytest.mark.parametrize("kinks", ["stepped-over", "located"])

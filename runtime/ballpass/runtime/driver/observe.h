@@ -32,14 +32,24 @@ static int write_outputs(bp_run *run, double start, double t, double h, double e
     return prepared;
 }
 
-/* The end of an accepted step [s], and whether it lies on a kink. */
-static void note_end(const bp_run *run, double time, int on_kink)
+/* A step that is kept: its end [s]; 1 where that lies on a kink, else 0; its method and dense output. */
+typedef struct {
+    double end, on_kink, start, t, h, lead, method, x[BP_NX], next[BP_NX], dense[BP_DENSE_ROWS][BP_NX];
+} bp_kept;
+
+/* Keep the accepted step from (t, x) to (t + h, next), which ends at `end`; t counts from the segment's start. */
+static void keep_step(bp_run *run, double start, double t, double h, double end, int on_kink, int prepared)
 {
     const ballpass_options *options = run->options;
-    if (options->ends == NULL) return;
-    double *place = options->ends + 2 * (*options->ended)++;
-    place[0] = time;
-    place[1] = on_kink;
+    if (options->kept == NULL) return;
+    if (!prepared) prepare_dense(run, t, h);
+    const double *lead = lead_of(run);
+    bp_kept *step = (bp_kept *)options->kept + (*options->keeps)++;
+    *step = (bp_kept){.end = end, .on_kink = on_kink, .start = start, .t = t, .h = h, .lead = 1.0, .method = run->method};
+    if (lead) step->lead = *lead;
+    memcpy(step->x, run->x, sizeof step->x);
+    memcpy(step->next, run->next, sizeof step->next);
+    memcpy(step->dense, run->dense, sizeof step->dense);
 }
 
 #ifdef BALLPASS_REDUCTIONS
@@ -66,9 +76,10 @@ static void reduce_start(bp_run *run, double start)
     bp_channels(&run->numbers, 0.0, run->x, run->reduction, run->sampled[0], run->balls[0]);
 }
 
-static void reduce_step(bp_run *run, double start, double t, double h, int prepared)
+/* Returns whether the step's dense output is prepared. */
+static int reduce_step(bp_run *run, double start, double t, double h, int prepared)
 {
-    if (run->reduction == NULL) return;
+    if (run->reduction == NULL) return prepared;
     if (!prepared) prepare_dense(run, t, h);
     const int parts = bp_parts(bp_methods[run->method].dense_degree);
     for (int part = 0; part < parts; part++) {
@@ -84,10 +95,11 @@ static void reduce_step(bp_run *run, double start, double t, double h, int prepa
         memcpy(run->balls[0], run->balls[BP_POINTS - 1], sizeof run->balls[0]);
         memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);
     }
+    return 1;
 }
 #else
 #define reduce_start(run, start) ((void)(start))
-#define reduce_step(run, start, t, h, prepared) ((void)(prepared))
+#define reduce_step(run, start, t, h, prepared) (prepared)
 #endif
 
 #endif

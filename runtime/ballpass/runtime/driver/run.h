@@ -99,10 +99,12 @@ typedef struct {
 #ifdef BALLPASS_LOCATED
 static int is_paced(const bp_run *run) { return run->lead != 1.0; }
 static const double *lead_of(const bp_run *run) { return &run->lead; }
+static void set_lead(bp_run *run, double lead) { run->lead = lead; }
 static double place_of(const bp_run *run, double part) { return is_paced(run) ? bp_theta(run->lead, part) : part; }
 #else
 #define is_paced(run) 0
 #define lead_of(run) NULL
+#define set_lead(run, lead) ((void)0)
 #define place_of(run, part) (part)
 #endif
 

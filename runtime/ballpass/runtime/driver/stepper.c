@@ -104,7 +104,8 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         result->step = run->step;
         return BALLPASS_PAUSED;
     }
-    reduce_step(run, start, t, h, prepared);
+    const int reduced = reduce_step(run, start, t, h, prepared);
+    keep_step(run, start, t, h, taken.last ? end : start + (t + h), taken.met == CUT, reduced);
     /* a step that was cut, or has its own pace, does not show which family suits */
     const int chosen = changeable && taken.met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
     tangent_accept(run);
@@ -116,7 +117,6 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     }
     if (taken.met == NO_KINK) remember_touch(run, h, taken.factor);
     const double reached = *time = taken.last ? length : t + h;
-    note_end(run, taken.last ? end : start + reached, taken.met == CUT);
     if (taken.met == CUT) {
         tangent_switch(run, reached);
         tangent_onset(run, reached, 1);
@@ -340,6 +340,29 @@ int ballpass_run(const ballpass_options *options, const double *p, const double 
     return run_all(&run, options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states, result);
 }
 
+void ballpass_states_at(const double *kept, long steps, long outputs, const double *output_times, double *output_states)
+{
+    const bp_kept *step = (const bp_kept *)kept, *last = step + steps - 1, *read = NULL;
+    bp_run run;
+    double x[BP_NX];
+    run.x = x;
+    for (long i = 0; i < outputs; i++) {
+        while (step < last && output_times[i] > step->end) step++;
+        if (read != step) {
+            read = step;
+            run.method = (int)step->method;
+            set_lead(&run, step->lead);
+            memcpy(x, step->x, sizeof x);
+            memcpy(run.next, step->next, sizeof run.next);
+            memcpy(run.dense, step->dense, sizeof run.dense);
+        }
+        const double theta = ((output_times[i] - step->start) - step->t) / step->h;
+        double *y = output_states + i * BP_NX;
+        if (theta >= 1.0) memcpy(y, run.next, sizeof run.next);
+        else state_at(&run, theta > 0.0 ? theta : 0.0, y);
+    }
+}
+
 #ifdef BALLPASS_SENSITIVITIES
 int ballpass_run_tangents(const ballpass_options *options, const double *p, const double *c, double *x, long segments, const double *times,
                          const double *inputs, const unsigned char *restarts, long outputs, const double *output_times,
@@ -372,7 +395,8 @@ void ballpass_sizes(int *sizes)
     sizes[3] = BP_NC;
     sizes[4] = BP_NB;
     sizes[6] = (int)sizeof(bp_run);
-    sizes[7] = (int)sizeof(ballpass_options);
-    sizes[8] = (int)sizeof(ballpass_result);
-    sizes[9] = (int)sizeof(ballpass_tangents);
+    sizes[7] = (int)(sizeof(bp_kept) / sizeof(double));
+    sizes[8] = (int)sizeof(ballpass_options);
+    sizes[9] = (int)sizeof(ballpass_result);
+    sizes[10] = (int)sizeof(ballpass_tangents);
 }

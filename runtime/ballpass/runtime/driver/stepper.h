@@ -40,8 +40,8 @@ typedef struct {
     int resume;              /* nonzero: continue the run kept there */
     double *before;          /* reductions of the time before the one where `reduction` begins; NULL: none */
     int pause;               /* nonzero, with `work`: end with the step that passes the last output time, before x moves on */
-    double *ends;            /* filled with the end of each accepted step [s] and 1 where it lies on a kink, else 0; NULL: not written */
-    long *ended;             /* how many there are so far, which the caller sets to zero: room for max_steps of a call */
+    double *kept;            /* filled with each accepted step, from which ballpass_states_at takes states; NULL: not written */
+    long *keeps;             /* how many there are so far, which the caller sets to zero: room for max_steps of a call */
 } ballpass_options;
 
 typedef struct {
@@ -82,6 +82,10 @@ BALLPASS_EXPORT int ballpass_run(const ballpass_options *options, const double *
                                const double *times, const double *inputs, const unsigned char *restarts, long outputs,
                                const double *output_times, double *output_states, ballpass_result *result);
 
+/* States at times of a run whose steps were kept, the same bits as its outputs there; row after row.  Of each step its end [s] comes first,
+   then 1 where it lies on a kink, else 0. */
+BALLPASS_EXPORT void ballpass_states_at(const double *kept, long steps, long outputs, const double *output_times, double *output_states);
+
 /* Directions along which a run is differentiated, BP_LANES to a block; entries of a block lie next to each other. */
 typedef struct {
     long blocks;
@@ -119,8 +123,8 @@ BALLPASS_EXPORT void ballpass_magnitudes(const double *p, const double *c, const
                                        double horizon, double *magnitude);
 #endif
 
-/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of the work of a run in several calls, of
-   options, result and tangents. */
+/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of the work of a run in several calls;
+   numbers of a step that is kept; bytes of options, result and tangents. */
 BALLPASS_EXPORT void ballpass_sizes(int *sizes);
 
 #endif

@@ -126,8 +126,8 @@ class Loop:
         Parameters
         ----------
         count : number of points
-        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
-            further keys are ignored
+        values : inputs by name; those that vary of shape (count,) or (count, ...), the others of shape (rows,) or
+            (...); further keys are ignored
         wanted : names of outputs.  Default: all
 
         Returns
@@ -148,7 +148,7 @@ class Loop:
         results = {name: np.empty((count, block.shape[1])) for name, block in blocks.items()}
         for name, memory in self._block.inputs.items():
             if name not in self._varying:
-                memory[:] = values[name]
+                memory[:] = np.reshape(values[name], -1)
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
             for name in self._varying:

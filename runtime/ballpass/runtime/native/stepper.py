@@ -60,8 +60,8 @@ class _Options(ctypes.Structure):
         ("resume", ctypes.c_int),
         ("before", ctypes.c_void_p),
         ("pause", ctypes.c_int),
-        ("ends", ctypes.c_void_p),
-        ("ended", ctypes.c_void_p),
+        ("kept", ctypes.c_void_p),
+        ("keeps", ctypes.c_void_p),
     )
 
 
@@ -118,7 +118,7 @@ class Outcome:
     steps, rejected, evaluations, factorizations, pivoted, switches, kinks : counts
     time : reached [s]
     step : last step size tried [s]
-    ends : ends of steps noted in this call
+    kept : steps kept in this call
     """
 
     end: End
@@ -134,11 +134,11 @@ class Outcome:
     kinks: int
     time: float
     step: float
-    ends: int
+    kept: int
 
 
 #: Fields of an outcome that are those of C.
-_REPORTED = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "method", "ends"))
+_REPORTED = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "method", "kept"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -195,6 +195,7 @@ class Stepper:
     ----------
     library : what was compiled
     lanes : directions that the driver differentiates along at once
+    kept : numbers of a step that is kept
 
     Raises
     ------
@@ -204,11 +205,11 @@ class Stepper:
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
-        code, sizes = open_driver(library, "ballpass_sizes", 7, (_Options, _Result, _TangentRecord))
-        self._inputs = input_columns(manifest)
+        code, sizes = open_driver(library, "ballpass_sizes", 8, (_Options, _Result, _TangentRecord))
+        self._inputs, self._states = input_columns(manifest), len(manifest.states)
         expected = (len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants))
         check_sizes(library, "states, inputs, parameters and constants", sizes[:4], expected)
-        self.lanes, self._work = sizes[5:]
+        self.lanes, self._work, self.kept = sizes[5:]
         self._code = code
         integer, long, result = ctypes.c_int, ctypes.c_long, ctypes.POINTER(_Result)
         run = (
@@ -218,6 +219,7 @@ class Stepper:
         declare(code, "ballpass_run", integer, *run, result)
         declare(code, "ballpass_run_tangents", integer, *run, ctypes.POINTER(_TangentRecord), result)
         declare(code, "ballpass_tangent_work", long, long)
+        declare(code, "ballpass_states_at", None, DOUBLES, long, long, DOUBLES, DOUBLES)
         magnitudes = (DOUBLES, DOUBLES, DOUBLES, long, DOUBLES, ctypes.c_double, DOUBLES)
         declare(code, "ballpass_magnitudes", None, *magnitudes)
 
@@ -244,7 +246,7 @@ class Stepper:
         smallest_step: float = 0.0,
         largest_step: float = np.inf,
         held: Held | None = None,
-        ends: np.ndarray | None = None,
+        kept: np.ndarray | None = None,
     ) -> Outcome:
         """Integrate over all segments.
 
@@ -263,12 +265,13 @@ class Stepper:
         held : from `hold`; where a call with it has taken all its steps, another continues with the same arguments and
             more `max_steps`, which then count those of all calls, as the reported counts do.  The bits are those of one
             call.  Not with `tangents`
-        ends : filled with the end of each accepted step [s] and 1.0 where it lies on a kink, else 0.0, shape (steps, 2)
-            with room for those of this call; `Outcome.ends` says how many they are
+        kept : filled with each accepted step for `read`, shape (steps, `self.kept`) with room for those of this call;
+            `Outcome.kept` says how many they are.  The first two numbers of each are its end [s] and 1.0 where it lies
+            on a kink, else 0.0
         """
         inputs = padded(segments.inputs, self._inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
-        ended = ctypes.c_long(0)
+        keeps = ctypes.c_long(0)
         options = _Options(
             *(
                 NAMES.index(method),
@@ -280,8 +283,8 @@ class Stepper:
                 address(reduction),
             ),
             before=address(before),
-            ends=address(ends),
-            ended=ctypes.addressof(ended),
+            kept=address(kept),
+            keeps=ctypes.addressof(keeps),
         )
         result = _Result()
         if held is not None:
@@ -305,7 +308,19 @@ class Stepper:
             )
             self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
         reported = {name: getattr(result, name) for name in _REPORTED}
-        return Outcome(end=End(result.status), method=NAMES[result.method], ends=ended.value, **reported)
+        return Outcome(end=End(result.status), method=NAMES[result.method], kept=keeps.value, **reported)
+
+    def read(self, kept: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """States at times of a run whose steps were kept, the same bits as its outputs there, shape (times, states).
+
+        Parameters
+        ----------
+        kept : all steps of the run, one at least
+        times : increasing, within the run [s]
+        """
+        found = np.empty((len(times), self._states))
+        self._code.ballpass_states_at(kept, len(kept), len(times), times, found)
+        return found
 
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float

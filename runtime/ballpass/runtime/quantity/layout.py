@@ -10,7 +10,7 @@ hold are searched between such nodes; a moment is a node of its own.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,6 +64,7 @@ class Layout:
     ----------
     items : the quantities
     still : whether they follow from time alone, so that no state has to be known
+    kept : steps of the run
     segments : of the driver
     edges, passages, panels, plan : where nodes lie; no panels where moments alone are asked for
     track, signals : states and channels along them
@@ -72,6 +73,7 @@ class Layout:
 
     items: tuple[Quantity, ...]
     still: bool
+    kept: Array
     segments: Segments
     edges: Edges
     passages: Passages
@@ -106,10 +108,12 @@ class NodeLayer:
     model : the model
     channels : those of the quantities
     rough : see `panels.parts_needed` [1]
-    along_nodes : search extremes between nodes also where reductions hold them
+    along_nodes : quantities whose extremes are searched between nodes although reductions hold them
     """
 
-    def __init__(self, model: LoadedModel, channels: ChannelValues, *, rough: float, along_nodes: bool) -> None:
+    def __init__(
+        self, model: LoadedModel, channels: ChannelValues, *, rough: float, along_nodes: Collection[Quantity]
+    ) -> None:
         self.model = model
         self._channels, self._rough, self._along_nodes = channels, rough, along_nodes
         # among the quantities of every bearing, whether or not the scene's outputs name them
@@ -121,18 +125,19 @@ class NodeLayer:
         names = channels_of([quantity])
         return all(name not in self.model.states and not depends(self.model, name, "x") for name in names)
 
-    def lay(self, run: Run, ends: Array, row: Array, noded: Sequence[Quantity]) -> list[Layout]:
+    def lay(self, run: Run, kept: Array, row: Array, noded: Sequence[Quantity]) -> list[Layout]:
         """Nodes of all quantities, and the run along them.
 
         Parameters
         ----------
-        ends : of the steps, and whether they lie on a kink, shape (steps, 2)
+        kept : steps of the run, see `loop.KeptSteps`
         row : reductions of the run
         """
         segments = segments_of(run)
         first = Layout(
             items=(),
             still=False,
+            kept=kept,
             segments=segments,
             edges=make_edges(run, segments, None),
             passages=Passages(times=np.zeros(0), edges=(), columns=np.zeros(0, dtype=int), near=0.0),
@@ -153,22 +158,21 @@ class NodeLayer:
             if sort.moment:
                 found.append(here)
                 continue
-            kinks = (ends[:, 1] > 0.0) & sort.graded
-            steps = panels_between(here.edges, ends[:, 0], kinks)
+            kinks = (kept[:, 1] > 0.0) & sort.graded
+            steps = panels_between(here.edges, kept[:, 0], kinks)
             here = self._along(run, here, uniform_panels(here.edges, run.turn) if sort.still else steps)
-            found += self._refined(run, here, ends[:, 0], kinks)
+            found += self._refined(run, here, kinks)
         return [self._with_extremes(run, one, row) for one in found]
 
     def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
         """The run along the nodes of panels."""
         plan = plan_of(panels, layout.edges)
-        track = follow(run, layout.segments, layout.edges, place(plan, layout.edges), still=layout.still)
+        nodes = place(plan, layout.edges)
+        track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
         signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
         return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
 
-    def _refined(
-        self, run: Run, layout: Layout, ends: Array, kinks: NDArray[np.bool_], passes: int = PASSES
-    ) -> list[Layout]:
+    def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
         """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
         assert layout.panels is not None
         assert layout.track is not None
@@ -179,7 +183,7 @@ class NodeLayer:
         each = []
         for item in layout.items:
             # an extreme where a load begins moves with it, so that extremes need passages as well
-            panels = panels_between(edges, ends, kinks) if passages.edges else layout.panels
+            panels = panels_between(edges, layout.kept[:, 0], kinks) if passages.edges else layout.panels
             if not self._is_found(item):
                 panels = panels if passages.edges else split(panels, self._parts(layout, item))
                 panels = cut_at(panels, edges, self._kinks(run, layout, item))
@@ -188,7 +192,7 @@ class NodeLayer:
         for here in self._each_along(run, replace(layout, edges=edges, passages=passages), each):
             # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
             again = layout.still and passes > 1 and here.panels is not layout.panels
-            found += self._refined(run, here, ends, kinks, passes - 1) if again else self._ranked(run, here)
+            found += self._refined(run, here, kinks, passes - 1) if again else self._ranked(run, here)
         return found
 
     def _each_along(self, run: Run, layout: Layout, each: Sequence[tuple[Quantity, Panels]]) -> list[Layout]:
@@ -258,7 +262,7 @@ class NodeLayer:
             return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))
 
         def look(nodes: Nodes) -> Mapping[str, Signal]:
-            seen = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
+            seen = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
             return self._channels.only(channels_of(layout.items)).along(seen, run.numbers)
 
         each = [wanted(item, kind) for item, kind in asked]
@@ -280,7 +284,7 @@ class NodeLayer:
         return kind.at_moment or (bool(kind.extremes) and top and self._is_held(quantity))
 
     def _is_held(self, quantity: Quantity) -> bool:
-        return is_reduced(self.model, quantity) and not self._along_nodes
+        return is_reduced(self.model, quantity) and quantity not in self._along_nodes
 
 
 def kind_of(quantity: Quantity) -> Kind:

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import math
 import time as clocks
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedR
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.locating import stepper_for
-from ballpass.runtime.run.loop import ReductionRow, Sink, StepEnds, start_run
+from ballpass.runtime.run.loop import KeptSteps, ReductionRow, Sink, start_run
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.resolve import Run
 
@@ -100,7 +101,8 @@ class QuantityRun:
     model : the model
     quantities : the requested ones
     rough : see `panels.parts_needed` [1]
-    along_nodes : evaluate along nodes also what reductions hold: integrals are then cut where balls change rank
+    along_nodes : evaluate these along nodes although reductions hold them: integrals are then cut where balls change
+        rank
     motion : reduce all states as well, for `Values.row`
     """
 
@@ -110,14 +112,14 @@ class QuantityRun:
         quantities: Sequence[Quantity],
         *,
         rough: float = ROUGH,
-        along_nodes: bool = False,
+        along_nodes: Collection[Quantity] = (),
         motion: bool = False,
     ) -> None:
         self.model = model
         self.quantities = tuple(quantities)
         self._motion = motion
         self._moving = [item for item in quantities if kind_of(item).at_rest is None]
-        self._reduced = [] if along_nodes else [item for item in self._moving if is_reduced(model, item)]
+        self._reduced = [item for item in self._moving if is_reduced(model, item) and item not in along_nodes]
         self._noded = [item for item in self._moving if item not in self._reduced]
         self._channels = ChannelValues(model, channels_of(self._moving))
         self._along_nodes = along_nodes
@@ -212,26 +214,27 @@ class QuantityRun:
         ----------
         directions : along which derivatives are taken at these nodes
         """
-        row, ends = np.zeros(0), StepEnds()
+        row, kept = np.zeros(0), np.zeros((0, 2))
         steps = rejected = 0
         seconds, state = 0.0, run.initial
         if self._moving or self._motion:
             run.check_steady()
             row = self._row(run)
         if self._runs:
-            sinks: list[Sink] = [ReductionRow(row=row), *([ends] if noded else [])]
+            stepper = stepper_for(run.model, run.kinks)  # compiled before it is timed
+            steps_taken = KeptSteps(numbers=stepper.kept, check=partial(self._check_memory, directions))
+            sinks: list[Sink] = [ReductionRow(row=row), *([steps_taken] if noded else [])]
             going = start_run(run, sinks)
-            stepper_for(run.model, run.kinks)  # compiled before it is timed
             begin = _now()
             going.go_on()
+            kept = steps_taken.all
             seconds, steps, rejected, state = _now() - begin, going.steps, going.rejected, going.state
         run = replace(run, progress=None)
         found: dict[str, Estimate] = {}
         layouts: list[Layout] = []
         if noded:
-            every = ends.all
-            self._check_memory(len(GAUSS) * max(len(every), math.ceil(run.cycles)), directions)
-            layouts = self._layer.lay(run, every, row, noded)
+            self._check_memory(directions, max(len(kept), math.ceil(run.cycles)))
+            layouts = self._layer.lay(run, kept, row, noded)
             for layout in layouts:
                 view = self._plain_view(run, layout)
                 found |= {item.name: _evaluated(view, item) for item in layout.items if item not in self._reduced}
@@ -256,13 +259,14 @@ class QuantityRun:
         nodes, marks = _with_moments(run, layout, layout.edges, place(layout.plan, layout.edges), None)
         signals = layout.signals
         if layout.track is None:
-            track = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
+            track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
             signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
         marks |= {key: _plain_mark(some[0]) for key, some in layout.extremes.items()}
         return View(run=run, nodes=nodes, signals=signals, marks=marks, slopes=lambda _: np.zeros(0), names=())
 
-    def _check_memory(self, nodes: int, directions: int) -> None:
-        """Refuse nodes that would not fit into memory, before any is laid."""
+    def _check_memory(self, directions: int, steps: int) -> None:
+        """Refuse steps whose nodes would not fit into memory, before any is laid."""
+        nodes = len(GAUSS) * steps
         derivatives = f" and derivatives by {directions} parameters" if directions else ""
         check_memory(
             f"{nodes} nodes, with states{derivatives}, of",
@@ -273,7 +277,7 @@ class QuantityRun:
 
     def _row(self, run: Run) -> Array:
         """An empty row of reductions, of what the quantities need."""
-        needed = {name for item in self._moving if is_reduced(self.model, item) for name in needs(item)}
+        needed = {name for item in self._reduced for name in needs(item)}
         if self._motion:
             needed |= set(self.model.states)
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])

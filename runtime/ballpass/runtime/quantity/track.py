@@ -26,6 +26,7 @@ from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.quantity.nodes import Edges, Nodes
 from ballpass.runtime.run.directions import Directions
+from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import Samples, start_run
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.resolve import Run
@@ -85,6 +86,7 @@ def follow(
     chain: Chain | None = None,
     sensitivity_rtol: float | None = None,
     *,
+    kept: Array | None = None,
     still: bool = False,
 ) -> Track:
     """States at the nodes; with derivatives along the directions of `chain`.
@@ -93,6 +95,7 @@ def follow(
     ----------
     segments : all of the run
     sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
+    kept : steps of the run, which is then not made again; not with derivatives
     still : nothing that is evaluated depends on the states, which stay zero
 
     Raises
@@ -108,6 +111,9 @@ def follow(
         empty = np.zeros((len(nodes), count))
         return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=u, segments=segments)
     times, back = np.unique(nodes.t, return_inverse=True)
+    if kept is not None:
+        x = stepper_for(model, run.kinks).read(kept, times)[back]
+        return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments)
     made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks)
     if made is not None and sensitivity_rtol is not None:
         made.control(sensitivity_rtol, run.magnitude)
@@ -180,7 +186,7 @@ class ChannelValues:
         self._columns = [(info.name, info.size) for info in self._outputs]
         self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
         self._own = threading.local()  # a loop is not for several threads, and differences run in several
-        self._derivatives: Loop | None = None
+        self._derivatives: dict[int, Loop] = {}
         self._parts: dict[tuple[str, ...], ChannelValues] = {}
 
     def only(self, channels: Collection[str]) -> ChannelValues:
@@ -242,15 +248,19 @@ class ChannelValues:
         return values, rates
 
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
-        if self._derivatives is None:
-            self._derivatives = self._loop()
-        moved = chain.inputs(track.segments.times)
+        directions = len(chain.names)
+        if directions not in self._derivatives:
+            self._derivatives[directions] = self._loop(directions)
+        loop, moved = self._derivatives[directions], chain.inputs(track.segments.times)
         values, slopes = [], []
         for first in range(0, len(track.nodes), BLOCK):
             part = slice(first, first + BLOCK)
-            value, slope = self._block(track, numbers, chain, moved[track.nodes.held[part]], part)
-            values.append(value)
-            slopes.append(slope)
+            given = {"t": track.local[part], "x": track.x[part], "u": track.u[part], "p": numbers.p, "c": numbers.c}
+            seeds = (track.nodes.slope[part], track.slope[part], moved[track.nodes.held[part]], chain.p, chain.c)
+            count = len(given["t"])
+            here = loop(count, given | {f"{name}_way": seed for name, seed in zip(given, seeds, strict=True)})
+            values.append(here["g"])
+            slopes.append(here["g_way"].reshape(count, -1, directions))
         value, slope = np.concatenate(values), np.concatenate(slopes)
         found, column = {}, 0
         for name, size in self._columns:
@@ -259,30 +269,14 @@ class ChannelValues:
             column += size
         return found
 
-    def _block(self, track: Track, numbers: Numbers, chain: Chain, moved: Array, part: slice) -> tuple[Array, Array]:
-        """Outputs at some nodes and their derivatives; `moved` are those of the inputs."""
-        assert self._derivatives is not None
-        given = {"t": track.local[part], "x": track.x[part], "u": track.u[part], "p": numbers.p, "c": numbers.c}
-        count = len(given["t"])
-        results = self._derivatives(count, given)
-        values = results["g"]
-
-        def by(name: str) -> Array:
-            """Derivative of all outputs by one argument, shape (nodes, rows, entries)."""
-            return results[f"g_{name}"].reshape(count, -1, values.shape[1]).transpose(0, 2, 1)
-
-        slope = by("t") * track.nodes.slope[part][:, None, :]
-        slope = slope + by("x") @ track.slope[part] + by("u") @ moved
-        return values, slope + by("p") @ chain.p + by("c") @ chain.c
-
-    def _loop(self) -> Loop:
-        """The channels asked for and their derivatives by each argument, made from the expression graph."""
-        return Loop(self._function(self._all_rows, derivatives=True), ("t", "x", "u"))
+    def _loop(self, directions: int) -> Loop:
+        """The channels asked for and their derivatives along directions, made from the expression graph."""
+        return Loop(self._function(self._all_rows, directions), ("t", "x", "u", "t_way", "x_way", "u_way"))
 
     def _function(
-        self, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], *, derivatives: bool = False
+        self, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], directions: int = 0
     ) -> casadi.Function:
-        """Rows as a function of all five arguments; with their derivatives by each."""
+        """Rows as a function of all five arguments; with their derivatives along directions, each given row by row."""
         manifest = self._model.manifest
         sizes = {
             "t": 1,
@@ -294,9 +288,13 @@ class ChannelValues:
         inputs = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
         wanted = casadi.vertcat(*rows(inputs))
         results, names = [casadi.densify(wanted)], ["g"]
-        if derivatives:
-            results += [casadi.vec(casadi.densify(casadi.jacobian(wanted, symbol))) for symbol in inputs.values()]
-            names += [f"g_{name}" for name in inputs]
+        if directions:
+            # CasADi's matrices are column after column, NumPy's row after row
+            ways = {f"{name}_way": casadi.SX.sym(name, directions, size) for name, size in sizes.items()}
+            along = casadi.jtimes(wanted, casadi.vertcat(*inputs.values()), casadi.horzcat(*ways.values()).T)
+            results.append(casadi.vec(casadi.densify(along).T))
+            names.append("g_way")
+            inputs |= {name: casadi.vec(way) for name, way in ways.items()}
         return casadi.Function("channels", list(inputs.values()), results, list(inputs), names)
 
     def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:

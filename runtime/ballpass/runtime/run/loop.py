@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -141,29 +141,40 @@ class ReductionRow:
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class StepEnds:
-    """Ends of the accepted steps.
+class KeptSteps:
+    """The accepted steps, from which states at any time of the run can be read.
 
     Attributes
     ----------
-    parts : ends [s], and 1.0 where they lie on a kink, else 0.0; shape (steps, 2) each
+    numbers : of each step (`Stepper.kept`)
+    check : called with how many there are, before more memory is taken for them
+    count : steps so far
+    parts : of them, shape (steps, numbers): of each its end [s] first, then 1.0 where it lies on a kink, else 0.0
     """
 
+    numbers: int
+    check: Callable[[int], None] = lambda _steps: None
+    count: int = 0
     parts: list[np.ndarray] = field(default_factory=list)
-    _room: np.ndarray = field(default_factory=lambda: np.empty((STEPS_A_CALL, 2)))
+    _room: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._room = np.empty((STEPS_A_CALL, self.numbers))
 
     def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
         """Room for those of a call."""
-        return {"ends": self._room}
+        return {"kept": self._room}
 
     def take(self, outcome: Outcome) -> None:
         """Keep those of a call."""
-        self.parts.append(self._room[: outcome.ends].copy())
+        self.count += outcome.kept
+        self.check(self.count)
+        self.parts.append(self._room[: outcome.kept].copy())
 
     @property
     def all(self) -> np.ndarray:
-        """Those of the whole run, shape (steps, 2)."""
-        return np.concatenate([np.empty((0, 2)), *self.parts])
+        """Those of the whole run, shape (steps, numbers)."""
+        return np.concatenate([np.empty((0, self.numbers)), *self.parts])
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -306,9 +317,9 @@ def segments_of(run: Run) -> Segments:
 
 def step_ends(run: Run) -> np.ndarray:
     """Ends of the steps of a run, shape (steps,) [s]; SimulationError where it fails."""
-    ends = StepEnds()
-    start_run(run, [ends]).go_on()
-    return ends.all[:, 0]
+    kept = KeptSteps(numbers=stepper_for(run.model, run.kinks).kept)
+    start_run(run, [kept]).go_on()
+    return kept.all[:, 0]
 
 
 def start_run(run: Run, sinks: Sequence[Sink], segments: Segments | None = None) -> RunUnderWay:

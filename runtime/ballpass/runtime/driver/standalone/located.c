@@ -2,4 +2,5 @@
 #define BALLPASS_LOCATED
 #define ballpass_run ballpass_run_located
 #define ballpass_sizes ballpass_sizes_located
+#define ballpass_states_at ballpass_states_at_located
 #include "stepper.c"
