@@ -71,7 +71,11 @@ def browser(tmp_path: Path) -> Iterator[Page]:
 def test_keys_on_a_slider_give_the_native_run_and_no_request_leaves(press: Model, page: Path, browser: Page) -> None:
     browser.open(page)
     own = shown(browser)
-    assert own["peak_ball_force"] == pytest.approx(peak_ball_force(press), rel=1e-6)
+    peak = press.refine_peak(press.simulate().steady(), "ball.force")
+    assert own["peak_ball_force"] == pytest.approx(peak.value, rel=1e-6)
+    turns = peak.time / 0.12  # of the crank, at 500 rpm
+    where = browser.value("document.querySelector('#results tbody td').textContent")
+    assert where == f"Highest ball force, at {turns % 1.0 * 360.0:.1f}\u00b0 of turn {int(turns) + 1} [N]"
     row = "document.querySelector('[data-name=\"bearing.clearance\"]')"
     browser.value(f"{row}.querySelector('input[type=range]').focus()")
     browser.press("ArrowRight", 5)

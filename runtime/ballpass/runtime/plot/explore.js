@@ -78,7 +78,7 @@ function readAddress() {
 }
 
 // -------------------------------------------------------------------------------------------------------------- results
-const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) + 360) % 360).toFixed(1)}\u00b0`;
+const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) + 360) % 360).toFixed(1)}\u00b0 of turn ${Math.floor(time / run.turn + 1e-9) + 1}`;
 
 // Rows of the table: key, words, unit, value, where.
 function resultsOf(run) {
@@ -252,7 +252,7 @@ async function work() {
       warned.forEach((words) => element(get("warned"), "p", `warning: ${words}`));
       const [first, second] = [solved - began, performance.now() - solved];
       set(get("took"), { "data-solve": first, "data-draw": second });
-      get("took").textContent = `Solved in ${first.toFixed(0)} ms, drawn in ${second.toFixed(0)} ms, all in this page.`;
+      get("took").textContent = `Solved in ${first.toFixed(0)} ms, drawn in ${second.toFixed(0)} ms, all in this page.${drawn.turning ? ` Pictures show the last ${solver.shown > 1 ? `${solver.shown} turns` : "turn"}.` : ""}`;
       get("fault").hidden = true;
       get("shown").classList.remove("waiting");
     } catch (fault) {
