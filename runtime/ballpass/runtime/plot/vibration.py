@@ -23,7 +23,7 @@ SHOWN = 6.0
 
 _LOOKS: dict[str, dict[str, Any]] = {
     "shaft": {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 0.8},
-    "FTF": {"color": SAND, "linestyle": (0, (1, 1)), "linewidth": 1.0},
+    "FTF": {"color": "#7b5ea7", "linestyle": (0, (1, 1)), "linewidth": 1.0},
     "BPFO": {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewidth": 1.2},
     "BPFI": {"color": SAND, "linestyle": (0, (4, 1.5)), "linewidth": 1.4},
     "2 BSF": {"color": "#5b8e7d", "linestyle": (0, (3, 1, 1, 1)), "linewidth": 1.2},
