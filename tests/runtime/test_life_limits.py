@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from ballpass.runtime import Model
+from ballpass.runtime.ask.life_limits import limits_of
 
 #: A light ring, much damped: the force on the bearing is the load.
 CALM = {"bearing.inner_ring.mass": 0.2, "bearing.inner_ring.damping": 5e3}
@@ -49,9 +51,15 @@ def test_a_bearing_within_all_limits_gets_no_word(make_model: Callable[..., Mode
     (slides,) = model.life(**options, parameters={**usual, "load.force.x": 100.0}).beyond  # type: ignore[arg-type]
     assert "0.0078 C_r: below 0.01 C_r" in slides
     # a ball of 2.0 g at 16.75 mm and 0.38 of 4000 rad/s
-    fast = model.life(**options, parameters={**usual, "shaft.speed": 4000.0}).beyond  # type: ignore[arg-type]
+    report = model.life(**options, parameters={**usual, "shaft.speed": 4000.0})  # type: ignore[arg-type]
+    fast = report.beyond
     force = 7800.0 * math.pi / 6.0 * 7.9375e-3**3 * 16.75e-3 * (0.5 * (1.0 - 7.9375 / 33.5) * 4000.0) ** 2
     assert any(f"centrifugal force of a ball, {force:.3g} N" in words for words in fast)
+    # where the outer ring turns they go round faster
+    force *= ((33.5 + 7.9375) / (33.5 - 7.9375)) ** 2
+    (bearing,), info = report.bearings, replace(model.manifest.bearings[0], inner_stands=True)
+    turned = limits_of(info, model.numbers(usual).values, bearing)
+    assert any(f"centrifugal force of a ball, {force:.3g} N" in words for words in turned)
     assert any("n d_m = 1.28e+06 mm/min exceeds 500000" in words for words in fast)
 
 

@@ -51,8 +51,8 @@ def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStre
     if found.static_safety < 1.0:
         yield f"the static safety s_0 = {found.static_safety:.2g} is below 1, the least of ISO 76."
     pitch, speed = float(geometry.pitch), abs(found.speed)
-    # the outer ring stands: the cage turns at (1 - gamma)/2 of the speed
-    centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * (0.5 * (1.0 - geometry.gamma) * speed) ** 2
+    cage = 0.5 * (1.0 + geometry.gamma if info.inner_stands else 1.0 - geometry.gamma) * speed
+    centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * cage**2
     share = 5.0 * load / info.balls
     if centrifugal > CENTRIFUGAL * share > 0.0:  # without a load there is no life that it could shorten
         yield (
