@@ -145,21 +145,21 @@ def measured(folder: Path | None) -> list[Second]:
 
 
 def printed(seconds: Sequence[Second] | None = None) -> list[str]:
-    """Both confusion matrices, and what was told of each file that was not always right."""
+    """Both confusion matrices, and what was found in each file that was not always right."""
     seconds = measured(None) if seconds is None else seconds
     seen, labels = simulated()
     forest = RandomForestClassifier(500, random_state=0).fit(seen, labels)
-    told = forest.predict(np.array([one.features for one in seconds]))
+    found = forest.predict(np.array([one.features for one in seconds]))
     out = [f"trained on {len(labels)} simulated seconds"]
-    for words, files in (("files the features were chosen on", CHOSEN), ("files nobody had looked at", UNSEEN)):
+    for words, files in (("files the features were chosen on", CHOSEN), ("files that no choice was made on", UNSEEN)):
         numbers = {number for those in files.values() for number in those}
-        pairs = [(one, str(said)) for one, said in zip(seconds, told, strict=True) if one.file in numbers]
+        pairs = [(one, str(said)) for one, said in zip(seconds, found, strict=True) if one.file in numbers]
         table = confusion_matrix([one.label for one, _ in pairs], [said for _, said in pairs], labels=CLASSES)
         right = sum(one.label == said for one, said in pairs)
         out += [
             "",
             f"{words}: {right} of {len(pairs)} seconds right",
-            "is       told " + " ".join(f"{c:>7}" for c in CLASSES),
+            "is      found " + " ".join(f"{c:>7}" for c in CLASSES),
         ]
         out += [
             f"{label:13} " + " ".join(f"{count:7}" for count in row)

@@ -182,14 +182,14 @@ class SteadyState(ShortRepr, Reported):
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
         lost = len(self.multipliers) - len(known)
-        told = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
-        told += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
+        listed = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
+        listed += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
         parts: list[str | ReportTable] = [
             f"{self.kind[0].upper()}{self.kind[1:]}: in a period a small disturbance becomes "
             f"{abs(self.multipliers[0]):.4g} times as large.",
             f"In a period {self.forcing}.",
             table,
-            f"Floquet multipliers, a factor of the disturbance a period for each direction: {told}",
+            f"Floquet multipliers, a factor of the disturbance a period for each direction: {listed}",
             contact_words(self.contacts),
             f"After each of Newton's iterations a period changed the state by "
             f"{', '.join(f'{left:.1e}' for left in self.left)} of its magnitude; {self.integrated} periods integrated, "
