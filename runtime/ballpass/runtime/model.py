@@ -562,8 +562,8 @@ class Model(PointModel, Questions):
         parameters : overrides, SI: name to one value for each member, or a mapping for each member, or a structured
             array
         observables : ``max:``, ``min:``, ``mean:``, ``rms:``, ``range:``, ``peak_time:``, ``peak_ball:``, ``min_time:``
-            or ``end:``, and a state or one of ball.force, ball.elastic_force, ball.damping_force, ball.deflection (of
-            the most loaded ball); also written ``peak_ball_force``, ``rms_inner_y``
+            or ``end:``, and a state or one of ball.force, ball.elastic_force, ball.damping_force, ball.deflection (the
+            largest of all balls); also written ``peak_ball_force``, ``rms_inner_y``
         cycles, duration : turns of driver or shaft, or time [s]; one of them
         transient : turns at the start that do not count
         rtol : error allowed per step, relative to each member's own magnitudes

@@ -7,7 +7,7 @@ A name is ``kind:output``, with ``[ball]`` for one ball and ``@place`` where a k
     max:ball.force          rms:inner.y        value:inner.y@240deg      amplitude:inner.y@bpfo
     max:ball.force[3]       range:inner.x      value:inner.y@0.41s       amplitude:inner.y@2x
 
-Without ``[ball]`` an output of the balls is that of the most loaded ball at each moment.  Underscores may stand for
+Without ``[ball]`` an output of the balls is the largest of all balls at each moment.  Underscores may stand for
 colon and points, ``peak_ball_force`` and ``rms_inner_y``.  What each kind does stands in its file in `kinds`.
 """
 
