@@ -67,6 +67,7 @@ def test_under_a_load_that_stands_both_readings_agree_whichever_ring_turns(
     found = model.simulate_many(table, READINGS, cycles=40, transient=2, growth=False, rtol=1e-6)
     single = model.quantities(READINGS, cycles=40, transient=2, rtol=1e-6)
     (report,) = model.life(cycles=40, transient=2, rtol=1e-6).bearings
+    assert (report.speed < 0.0) is (ring == "outer")  # of the inner ring against the outer one
     for name in READINGS:
         assert float(found[name][0]) == pytest.approx(report.lives["sectors"], rel=5e-3)
         assert single[name].value == pytest.approx(report.lives[name.removeprefix("life_")], rel=1e-3)

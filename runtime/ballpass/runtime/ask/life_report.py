@@ -107,7 +107,9 @@ def _bearing(
     uneven = manifest.mechanism is not None and manifest.mechanism.angle
     turning = driver_angle.shaft_speed(manifest, moving)
     why = why_no_life(info, moving, turning)
-    speed = 0.0 if why else math.copysign(history.speeds[info.prefix], moving[info.ring_speed])
+    # of a shaft that carries the outer ring, `ring_speed` is that ring's
+    sense = -moving[info.ring_speed] if info.inner_stands and not info.joint else moving[info.ring_speed]
+    speed = 0.0 if why else math.copysign(history.speeds[info.prefix], sense)
     powers = history.powers[info.prefix]
     found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
     load = samples.equivalent_load(float(ratings.life.basic))
