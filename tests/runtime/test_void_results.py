@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +47,18 @@ def test_commands_end_with_what_to_change(words: str, scene: Path) -> None:
     said = " ".join(done.stderr.split())
     assert "a ball is flattened by" in said
     assert "Reduce load, speed or clearance" in said
+
+
+def test_lanes_find_the_members_that_are_void_alone(make_model: Callable[..., Model]) -> None:
+    """Where nothing of the balls is asked for, their deflection is taken at ends of steps, and near its largest."""
+    model = make_model("varying_compliance")
+    table = {FORCE: np.geomspace(1e5, 1e6, 40).tolist()}
+    given: dict[str, Any] = {"cycles": 1, "transient": 0, "rtol": 1e-6}
+    lanes, alone = (model.simulate_many(table, "rms:inner.x", lanes=lanes, **given) for lanes in (True, False))
+    assert lanes.statistics.lanes > 1
+    void = [failure.member for failure in lanes.failures if failure.status == Status.VOID.name]
+    assert 10 < len(void) < 30
+    assert void == [failure.member for failure in alone.failures if failure.status == Status.VOID.name]
 
 
 def test_members_are_void_one_by_one(make_model: Callable[..., Model]) -> None:

@@ -294,6 +294,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int method)
     b->method = method;
     b->wanted = job->reductions != NULL ? job->reductions + BP_WANTED : NULL;
     b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
+    b->guarded = b->balls && !bp_balls_asked(job->reductions);
     b->powers = job->reductions != NULL ? bp_powers_wanted(job->reductions) : 0;
     b->numbers.u = b->u;
     b->numbers.p = b->p;

@@ -59,6 +59,7 @@ typedef struct {
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
     int method;         /* which this pass advances */
     int balls, powers;  /* whether channels of the balls, and powers of their loads, are reduced */
+    int guarded;        /* whether of these only such as guard a run */
     const double *wanted; /* not zero for channels that are reduced; all members have the same */
     bp_lane_numbers numbers;
     bp_lane_angles angles; /* of the step tried */

@@ -99,11 +99,18 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         else if (b->method == BP_AUTO_LOW) bp_lane_explicit_at(bp_methods[BP_AUTO_LOW].plain, dense, b->x, b->next, theta, y);
         else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
         else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
-        if (!b->balls) continue;
+        if (!b->balls || (b->guarded && q < BP_POINTS - 1)) continue;
         double time[BP_L] BP_ALIGNED;
         BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
         bp_lane_ball_channels(&b->numbers, time, y, b->wanted, b->powers, y + BP_NX * BP_L, b->first[q]);
     }
+    /* channels that only guard against results that mean nothing are evaluated at the ends, and between where that may be a new extreme */
+    for (int k = BP_NX; k < BP_LOOKED_AT && b->guarded; k++)
+        for (int q = 1; q < BP_POINTS - 1; q++)
+            BP_EACH_LANE {
+                const double *end = b->sampled[BP_POINTS - 1] + k * BP_L, *start = b->sampled[0] + k * BP_L;
+                b->sampled[q][k * BP_L + lane] = start[lane] + 0.25 * q * (end[lane] - start[lane]);
+            }
     double news[BP_EXTREMES][BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};
     for (int k = 0; k < BP_CHANNELS; k++) {

@@ -51,6 +51,14 @@ static inline int bp_balls_wanted(const double *reduction)
     return wanted;
 }
 
+/* Whether one of them is asked for, and does not only guard the run. */
+static inline int bp_balls_asked(const double *reduction)
+{
+    int asked = 0;
+    for (int k = BP_NX; k < BP_CHANNELS; k++) asked |= reduction[BP_WANTED + k] == 1.0;
+    return asked;
+}
+
 /* Whether powers of the loads are. */
 static inline int bp_powers_wanted(const double *reduction)
 {

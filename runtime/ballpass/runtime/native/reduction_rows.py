@@ -38,6 +38,9 @@ MOMENTS = {"integral": 1, "square": 2}
 #: The channel that shows whether a bearing can be so.
 DEFLECTION = "ball.deflection"
 
+#: What is wanted of it in rows that do not ask for it.
+GUARD = 0.5
+
 #: What a row holds of every channel.
 ROWS = (
     "wanted",
@@ -147,7 +150,8 @@ class ReductionRows:
         below = (n.removesuffix(power.name) + power.of for n in channels for power in POWERS if n.endswith(power.name))
         wanted = {*channels, *below}
         for name in self.channels:
-            rows[:, self.column("wanted", name)] = name in wanted or (bool(channels) and name.endswith(DEFLECTION))
+            guards = bool(channels) and name.endswith(DEFLECTION)
+            rows[:, self.column("wanted", name)] = 1.0 if name in wanted else GUARD if guards else 0.0
         return rows
 
 
