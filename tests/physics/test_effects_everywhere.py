@@ -16,6 +16,7 @@ from ball_effects import taken
 from comparison import drawn, power_imbalance
 from coupled_scenes import EFFECTS, POWERS, RUN, SPALLS, TANGENT, UNDAMPED, Derived, bearing, with_bearings
 from multibody import Multibody
+from virtual import virtual_model
 
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
@@ -97,6 +98,27 @@ def test_a_heavy_ring_in_a_light_linkage_feels_effects_as_one_coupled_one_way_do
         changed.append(np.array([wavy - plain for wavy, plain in rows]))
     assert np.max(np.abs(changed[1])) > 10.0
     assert changed[0] == pytest.approx(changed[1], rel=1e-6, abs=1e-6 * np.max(np.abs(changed[1])))
+
+
+FLAT = 'table = { time = ["0 s", "6 s"], speed = ["500 rpm", "500 rpm"] }\n'
+ONE_WAY = bearing("A", elastic=True, effects=ALL, angle="25 deg").replace('coupling = "two-way"', "share = 0.5")
+
+
+@pytest.mark.long
+def test_a_table_of_one_speed_gives_the_forces_of_that_speed(tmp_path: Path) -> None:
+    """Effects are functions of time there, and of the state here; each ball's deflection and damping agree."""
+    even = press(f'{ONE_WAY}[bearings.at_A.inner_ring]\nmass = "0.4 kg"\n')
+    steady, table = (
+        virtual_model(text, tmp_path / name) for name, text in (("even", even), ("flat", even.replace(SPEED, FLAT)))
+    )
+    rng, speed = np.random.default_rng(7), steady.parameters["mechanism.driver.speed"]
+    names = ["at_A.ball.deflection", "at_A.ball.damping_force"]
+    for t in rng.uniform(0.0, 0.2, 8).tolist():
+        x = np.concatenate([rng.uniform(-3e-5, 3e-5, 4), rng.uniform(-0.1, 0.1, 4)])
+        driven = np.concatenate([x[:4], [speed * t], x[4:], [speed]])
+        one, other = steady.evaluate(t, x, names), table.evaluate(t, driven, names)
+        for name in names:
+            assert other[name] == pytest.approx(one[name], rel=1e-9, abs=1e-9 * np.max(np.abs(one[name])))
 
 
 #: With preload, so that every ball strikes the edges.
