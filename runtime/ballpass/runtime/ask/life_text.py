@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, StateStrength
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
-from ballpass.runtime.ratings.readings import READINGS
+from ballpass.runtime.ratings.readings import READINGS, SHORT_READINGS
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable, Words
@@ -152,9 +152,8 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         (element.contact_words, *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
     ]
     for reading in bearing.lives:
-        mark = GOVERNS if reading == bearing.governing else ""
         loads = (_force(ring.equivalent_loads[reading]) for ring in rings)
-        rows.append((f"equivalent {element.noun} load by {reading}{mark}", *loads))
+        rows.append((f"equivalent {element.noun} load {_by(reading, bearing.governing)}", *loads))
     if bearing.lives:
         rows += [
             ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
@@ -186,7 +185,7 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
     lives = {
         f"basic L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
-        **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},
+        **{f"reference L_10r {_by(reading, bearing.governing)}": life for reading, life in bearing.lives.items()},
     }
     if bearing.factor is not None:
         film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
@@ -212,15 +211,17 @@ def _duty_parts(life: DutyLife) -> _Parts:
     head = f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"
     if life.why_no_life:
         return ["", head, f"  No rating life. {life.why_no_life}"]
-    lives = {_reading_words(name, life.governing): (life.turns[name], spent) for name, spent in life.hours.items()}
+    lives = {
+        f"reference L_10r {_by(name, life.governing)}": (life.turns[name], spent) for name, spent in life.hours.items()
+    }
     if life.modified_hours is not None and life.modified_turns is not None:
         lives["modified L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
     return ["", head, _lives(lives), f"  Damage: {shares}."]
 
 
-def _reading_words(reading: str, governing: str) -> str:
-    return f"reference L_10r by {reading}{GOVERNS if reading == governing else ''}"
+def _by(reading: str, governing: str) -> str:
+    return f"by {reading}, {SHORT_READINGS[reading]}{GOVERNS if reading == governing else ''}"
 
 
 def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:

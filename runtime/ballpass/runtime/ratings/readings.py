@@ -33,6 +33,9 @@ READINGS = {
     "sectors": "damage of every place of both raceways, the ring as it turns",
 }
 
+#: What a row of a table says of a reading.
+SHORT_READINGS = {"mean": "loads averaged", "miner": "damage added up", "sectors": "damage by place"}
+
 #: Quantities: the readings that each takes the shortest life of.
 KINDS = {"life": tuple(READINGS), **{f"life_{reading}": (reading,) for reading in READINGS}}
 
