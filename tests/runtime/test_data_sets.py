@@ -27,6 +27,7 @@ from ballpass.runtime import (
 from ballpass.runtime.many import data_set
 from ballpass.runtime.many.cluster import connected
 from ballpass.runtime.many.distributions import draw
+from ballpass.runtime.many.spall_entries import entry_times
 
 CLEARANCE = "bearing.clearance"
 SIGNALS = Signals(outputs=("inner.x", "inner.vy"), sample_rate=5e3, duration=0.04, transient=0.01, rtol=1e-5)
@@ -313,6 +314,23 @@ def test_entry_times_of_a_spall_are_those_of_the_cage(
         beside = np.abs(np.angle(np.exp(1j * (angles - edge)))).min(axis=1)
         assert np.all(beside < 1e-9)
         assert len(entries) in (int(0.1 * 8 * abs(cage) / (2 * np.pi)) + k for k in (0, 1))
+        assert np.all((entries >= 0.01) & (entries < 0.11))
+
+
+def test_entry_times_follow_a_slip_of_the_cage_that_changes(make_virtual: Callable[..., Model]) -> None:
+    """They were those of the last slip from the start on: off by half a ball pitch here."""
+    spall = 'on = "outer"\nangle = "270 deg"\nchord = "2 mm"\nprofile = "half-sine"\ndepth = "5 um"'
+    slip = 'slip = { time = ["0 s", "0.03 s"], value = [0.0, 0.1] }'
+    here = "[bearing.initial]"
+    model = make_virtual("rotor", (here, f"[bearing.defects.pit]\n{spall}\n\n[bearing.cage]\n{slip}\n\n{here}"))
+    starts = np.array([0.0, 1.0, 2.5])
+    found = entry_times(model, {"bearing.ball_angle": starts}, 0.01, 0.11)["defects.pit"]
+    cage, edge = model.constants()["bearing.cage_ratio"] * 100.0 * np.pi, model.constants()["bearing.defects.pit.begin"]
+    for start, times in zip(starts, found, strict=True):
+        entries = times[np.isfinite(times)]
+        turned = start + cage * (entries - 0.1 * np.maximum(entries - 0.03, 0.0))
+        assert np.abs(np.angle(np.exp(1j * (8 * turned - edge)))).max() < 1e-8
+        assert len(entries) in (int(8 * cage * (0.1 - 0.1 * 0.08) / (2 * np.pi)) + k for k in (0, 1))
         assert np.all((entries >= 0.01) & (entries < 0.11))
 
 

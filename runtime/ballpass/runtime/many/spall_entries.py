@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
@@ -26,7 +27,7 @@ def spalls_of(model: LoadedModel) -> tuple[str, ...]:
 def entry_times(
     model: LoadedModel, parameters: Mapping[str, np.ndarray], begin: float, end: float
 ) -> dict[str, np.ndarray]:
-    """Times at which a ball reaches a spall, at constant speed.
+    """Times at which a ball reaches a spall, at constant speed; the slip of the cage may change.
 
     Parameters
     ----------
@@ -46,13 +47,21 @@ def entry_times(
         name = item.name.removeprefix(_GATE)
         if name not in spalls:
             continue
-        offset, rate = columns[item.offset], columns[item.rate]
-        opening = [np.where(rate > 0.0, columns[first], columns[last]) for first, last in item.windows]
-        turn = np.divide(driver_angle.TURN, np.abs(rate), out=np.full(len(rate), np.inf), where=rate != 0.0)
-        count = int(np.ceil(np.max((end - begin) / turn))) + 1
-        phase = np.array([np.mod(np.sign(rate) * (at - offset - rate * begin), driver_angle.TURN) for at in opening])
-        first = begin + phase / driver_angle.TURN * np.where(np.isfinite(turn), turn, np.nan)
-        times = (first[..., None] + np.arange(count) * turn[:, None]).transpose(1, 0, 2).reshape(len(rate), -1)
-        times = np.sort(np.where(times < end, times, np.nan), axis=1)  # NaN last
-        found[name] = times[:, : int(np.max(np.sum(np.isfinite(times), axis=1), initial=1))]
+        used = {item.offset, item.rate, *item.times, *item.values, *(edge for pair in item.windows for edge in pair)}
+        members = [
+            _entries(item, {key: float(columns[key][k]) for key in used}, begin, end)
+            for k in range(len(columns[item.rate]))
+        ]
+        found[name] = np.full((len(members), max(1, *map(len, members))), np.nan)
+        for row, times in zip(found[name], members, strict=True):
+            row[: len(times)] = times
     return found
+
+
+def _entries(item: InputInfo, values: Mapping[str, float], begin: float, end: float) -> np.ndarray:
+    """Times from `begin` to before `end` at which a window opens, increasing [s]."""
+    # a cage that slips keeps its sense
+    edges = {first if values[item.rate] > 0.0 else last for first, last in item.windows}
+    times = [times for edge, times in driver_angle.edge_times(item, values, begin, end) if edge in edges]
+    found = np.sort(np.concatenate([np.zeros(0), *times]))
+    return found[found < end]
