@@ -10,6 +10,7 @@ import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
 from ballpass.runtime.ask.fit_report import FitAnswer
+from ballpass.runtime.report.text import to_text
 
 RATIO, CLEARANCE, HOUSING = "bearing.damping.ratio", "bearing.clearance", "bearing.outer_ring.stiffness"
 VARY = (f"{RATIO}=1e-6 s:1e-5 s:log", f"{CLEARANCE}=5 um:30 um", f"{HOUSING}=30 MN/m:80 MN/m")
@@ -84,6 +85,7 @@ def test_a_product_is_reported_as_one_number(make_model: Callable[..., Model]) -
     assert group.value == pytest.approx(1.2e-4, abs=3.0 * group.deviation * 1.2e-4)
     assert group.deviation < 0.05
     assert [np.isnan(one.value) for one in found.numbers] == [True, True, False]
+    assert max(map(len, to_text(found._report()).splitlines())) <= 80
     assert abs(found.numbers[2].value - 7e-6) < 4.0 * found.numbers[2].deviation < 1e-6
 
 

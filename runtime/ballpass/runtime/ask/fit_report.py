@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.show.short import ShortRepr
@@ -150,6 +151,7 @@ class FitAnswer(ShortRepr, Reported):
             heads=("number", "value", "deviation", "95 % interval", "unit"),
             rows=[_row(one) for one in self.numbers],
             right=("value", "deviation"),
+            wrapped=("number",),
             caption="intervals by profiles of the misfit" if self.profile else "",
         )
         said = []
@@ -163,7 +165,7 @@ class FitAnswer(ShortRepr, Reported):
             f"Differences of {one.name}: {one.noise:.3g} of their deviations, or of values without one"
             if one.axis == "quantity"
             else f"Noise of {one.name}: {_shown(one.noise, one.unit)}, "
-            f"{100.0 * one.noise / float(np.std(one.measured)):.2g} % of the signal"
+            f"{rounded(100.0 * one.noise / float(np.std(one.measured)), 2)} % of the signal"
             for one in self.signals
         ]
         pairs = np.argwhere(np.triu(np.abs(np.nan_to_num(self.correlations)), 1) > CORRELATED)
@@ -172,7 +174,7 @@ class FitAnswer(ShortRepr, Reported):
             for i, j in pairs.tolist()
         ]
         if len(self.starts) > 1:
-            ends = ", ".join(f"{end:.6g}" for _, end in self.starts)
+            ends = ", ".join(f"{end:.4g}" for _, end in self.starts)
             said.append(
                 f"{len(self.starts)} starts ended with these mean squares of the differences over the noise (1: noise "
                 f"alone is left): {ends}"
@@ -229,9 +231,9 @@ def _shown(value: float, unit: str) -> str:
 
 def _row(one: FittedNumber) -> tuple[str, ...]:
     if math.isnan(one.value):
-        return one.name, "not determined", "", "", ""
+        return one.name, "", "", "not determined", ""
     if one.held:
-        return one.name, f"{one.value / one.factor:.6g}", "", f"held by its {one.held} end", one.shown_unit
+        return one.name, f"{one.value / one.factor:.6g}", "", "end of its range", one.shown_unit
     digits = max(3, 3 + math.floor(math.log10(max(abs(one.value) / one.deviation, 1.0))))
     low, value, high = (
         "bound" if math.isnan(number) else f"{number / one.factor:.{digits}g}"
