@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from ballpass.derive.scene.units import COMMON, KINDS, QuantityError, looked_up_size, parse_quantity
 from ballpass.runtime.contract.errors import BallpassError
+from ballpass.runtime.contract.units import table_unit
 
 
 @pytest.mark.parametrize(
@@ -219,6 +220,13 @@ def test_refusals_name_the_kind_that_is_asked_for() -> None:
         assert math.isfinite(parse_quantity(example, unit)), "every example of a message must itself be right"
         with pytest.raises(QuantityError, match=kind):
             parse_quantity("1 cd", unit)
+
+
+@pytest.mark.parametrize("unit", sorted(set(KINDS) - {"1"}))
+def test_a_number_of_a_table_is_read_in_a_scene(unit: str) -> None:
+    factor, shown = table_unit(unit)
+    assert "*" not in shown
+    assert parse_quantity(f"{factor!r} {shown}", unit) == pytest.approx(1.0, rel=1e-15)
 
 
 def test_rational_powers_multiply() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.contract.units import printed_unit, table_unit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -233,10 +233,10 @@ def _row(one: FittedNumber) -> tuple[str, ...]:
     if math.isnan(one.value):
         return one.name, "", "", "not determined", ""
     if one.held:
-        return one.name, f"{one.value / one.factor:.6g}", "", "end of its range", one.shown_unit
+        return one.name, f"{one.value / one.factor:.6g}", "", "end of its range", printed_unit(one.shown_unit)
     digits = max(3, 3 + math.floor(math.log10(max(abs(one.value) / one.deviation, 1.0))))
     low, value, high = (
         "bound" if math.isnan(number) else f"{number / one.factor:.{digits}g}"
         for number in (one.low, one.value, one.high)
     )
-    return one.name, value, f"{one.deviation / one.factor:.3g}", f"{low} to {high}", one.shown_unit
+    return one.name, value, f"{one.deviation / one.factor:.3g}", f"{low} to {high}", printed_unit(one.shown_unit)

@@ -13,6 +13,7 @@ import numpy as np
 from ballpass.runtime.ask.contact_sequence import GRAZES, ContactSequence
 from ballpass.runtime.ask.continuation import SteadyBranch
 from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.report.report import ReportTable
 
 #: A multiplier is on the unit circle within this [1].
@@ -87,11 +88,12 @@ def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange) -> Repo
             if id(point) in listed:
                 behind = f"{listed[id(point)].value / over.factor:.9g}"
                 rows.append((str(branch.repeats), f"{value} to {behind}", "contacts change", ""))
+    value = f"value, {printed_unit(over.shown_unit)}"
     return ReportTable(
         title=f"Branches over {over.name}",
-        heads=("period", f"value, {over.shown_unit}", "what", "largest multiplier"),
+        heads=("period", value, "what", "largest multiplier"),
         rows=rows,
-        right=("period", f"value, {over.shown_unit}", "largest multiplier"),
+        right=("period", value, "largest multiplier"),
     )
 
 
@@ -145,7 +147,7 @@ def grazing_warnings(branch: SteadyBranch, over: ParameterRange) -> list[str]:
         one, other = (point.value / over.factor for point in passed[0])
         found.append(
             f"contacts are added or lost in {len(passed)} of {len(branch.points) - 1} steps (first: {one:.9g} to "
-            f"{other:.9g} {over.shown_unit})"
+            f"{other:.9g} {printed_unit(over.shown_unit)})"
         )
     if near:
         found.append(f"{len(near)} points have an extreme of a deflection below {GRAZES:g} of the largest one")

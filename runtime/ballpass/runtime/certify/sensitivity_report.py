@@ -14,6 +14,7 @@ from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.quantity.values import QuantityValue
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
@@ -189,7 +190,7 @@ class SensitivityReport(Reported):
         return (
             f"{len(self.disagreements)} of {len(self.pairs)} derivatives disagree with their second route, "
             f"{first.check.route}, first d({first.quantity})/d({first.parameter}): {first.by_steps:.9g} and "
-            f"{_number(first.check.value)} {first.unit}. "
+            f"{_number(first.check.value)} {printed_unit(first.unit)}. "
             "Do not rely on them; take a tighter --rtol and --sensitivity-rtol, or fewer turns."
         )
 
@@ -279,7 +280,7 @@ def _bounded(pair: Sensitivity) -> bool:
 
 
 def _title(quantity: QuantityValue, described: str) -> str:
-    words = f"{described}\n{quantity.name} = {quantity.value:.6g} {quantity.unit}".lstrip()
+    words = f"{described}\n{quantity.name} = {quantity.value:.6g} {printed_unit(quantity.unit)}".lstrip()
     if quantity.time is not None:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:
@@ -305,7 +306,7 @@ def _row(pair: Sensitivity, *, judged: bool) -> tuple[Words, ...]:
     elif check.bounded:
         words += f" to ±{check.quantum:.0e}"
     verdict = [Marked(words, _LOOKS[check.verdict])] if judged else []
-    return (pair.parameter, relative, f"{number} {pair.unit}", *verdict)
+    return (pair.parameter, relative, f"{number} {printed_unit(pair.unit)}", *verdict)
 
 
 def _remarks(report: SensitivityReport) -> list[Words]:
@@ -326,7 +327,8 @@ def _remarks(report: SensitivityReport) -> list[Words]:
             "disagrees",
             "bad",
             f": d({pair.quantity})/d({pair.parameter}) is {pair.by_steps:.9g}, by "
-            f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}",
+            f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} "
+            f"{printed_unit(pair.unit)}",
         )
         for pair in report.disagreements
     ]

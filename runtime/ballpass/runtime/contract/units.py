@@ -102,7 +102,13 @@ class GrammarError(Exception):
 
 def table_unit(unit: str) -> tuple[float, str]:
     """Factor and unit of a number in tables and figures."""
-    return _TABLE_UNITS.get(unit, (1.0, unit))
+    factor, shown = _TABLE_UNITS.get(unit, (1.0, unit))
+    return factor, printed_unit(shown)
+
+
+def printed_unit(unit: str) -> str:
+    """A unit of a scene, a request or a file as tables write it: N·s/m for N*s/m."""
+    return unit.replace("*", "·")
 
 
 def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> float:

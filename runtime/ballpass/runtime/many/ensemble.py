@@ -23,6 +23,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import real, unknown_name
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
 from ballpass.runtime.many.member_values import measure_members
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
@@ -131,7 +132,7 @@ class EnsembleResult(Reported, Mapping[str, np.ndarray]):
         for name, values in (*self.parameters.items(), *self.observables.items()):
             known = values[np.isfinite(values)]
             cells = [f"{f(known):z.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
-            rows.append((name, *cells, units[name]))
+            rows.append((name, *cells, printed_unit(units[name])))
         right = ("min", "median", "max")
         table = ReportTable(
             title=f"{self.manifest.title}: {len(next(iter(self.parameters.values())))} members",

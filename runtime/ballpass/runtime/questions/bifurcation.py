@@ -14,6 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -113,7 +114,7 @@ class Bifurcation(ShortRepr, Reported):
     apart: tuple[float, ...]
 
     def _report(self) -> Report:
-        unit, factor = self.vary.shown_unit, self.vary.factor
+        unit, factor = printed_unit(self.vary.shown_unit), self.vary.factor
         rows = []
         for name, motions in (("up", self.up), ("down", self.down)):
             for kind, group in groupby(motions, key=lambda motion: motion.kind):

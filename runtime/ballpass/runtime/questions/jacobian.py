@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from ballpass.runtime.contract.options import Check, CrankAngle, Instant, Option
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -59,7 +60,8 @@ def _report(result: CheckedJacobian) -> Report:
         if entry["sides"]:
             value = "{:z.7g} or {:z.7g}".format(*entry["sides"])
         verdict = [] if agreed else [entry["verdict"]]
-        rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], *verdict))
+        unit = printed_unit(entry["unit"])
+        rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", unit, *verdict))
     table = ReportTable(
         title=f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
         heads=("quantity", "parameter", "derivative", "by differences", "unit", *([] if agreed else ["verdict"])),

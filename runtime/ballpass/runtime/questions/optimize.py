@@ -13,7 +13,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
-from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.contract.units import printed_unit, table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -151,7 +151,7 @@ class Optimum(ShortRepr, Reported):
                 (
                     one.name,
                     f"{value / one.factor:.8g}",
-                    one.shown_unit,
+                    printed_unit(one.shown_unit),
                     f"{bound} end" if bound else "",
                     ", ".join(f"{factor * one.factor * slope:.5g}" for slope in self.slopes[:, k]),
                 )
@@ -171,7 +171,7 @@ class Optimum(ShortRepr, Reported):
             from ballpass.runtime.certify.worst_values import FURTHER
 
             deviations = ", ".join(
-                f"{one.name} {value / one.factor:+.6g} {one.shown_unit}"
+                f"{one.name} {value / one.factor:+.6g} {printed_unit(one.shown_unit)}"
                 for one, value in zip(self.tolerances, self.worst, strict=True)
             )
             said.append(

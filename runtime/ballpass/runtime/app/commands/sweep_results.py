@@ -16,7 +16,7 @@ import numpy as np
 from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
-from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.contract.units import printed_unit, table_unit
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
@@ -92,7 +92,7 @@ class Sweep:
     def place(self, member: int) -> str:
         """Parameters of a member, in words and the units of the request."""
         return ", ".join(
-            f"{one.path} = {value / one.factor:.6g} {one.shown_unit}".removesuffix(" 1")
+            f"{one.path} = {value / one.factor:.6g} {printed_unit(one.shown_unit)}".removesuffix(" 1")
             for one, value in zip(self.ranges, self.point(member), strict=True)
         )
 
@@ -205,7 +205,7 @@ class Sweep:
     def all_members(self) -> ReportTable:
         """All members, each a row."""
         columns = {name: self.shown(name) for name in self.result.observables}
-        heads = [_head(one.path, one.shown_unit) for one in self.ranges]
+        heads = [_head(one.path, printed_unit(one.shown_unit)) for one in self.ranges]
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
         rows = []
         for member in range(math.prod(self.shape)):
