@@ -5,7 +5,7 @@
 # make generated   derives the committed artefact anew
 # make extremes   runs all extreme cases, also the long ones, and writes docs/extremes.md (some minutes)
 # make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
-# make bench   installs the peers into a venv of their own and measures (25 minutes); QUICK=1: two minutes, for show
+# make bench   installs the peers into a venv of their own and measures (25 quiet minutes); QUICK=1: two minutes, for show
 
 PYTHON ?= python3
 VENV ?= .venv

@@ -70,7 +70,7 @@ def _version(name: str) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure the parts that are asked for; the page holds them and those measured before at the same commit."""
+    """Measure the parts that are asked for; the page holds them and those measured before, each with its commit."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="run every part briefly; the numbers mean nothing")
     parser.add_argument("--draw", action="store_true", help="measure nothing: write the page from existing results")
@@ -86,23 +86,19 @@ def main(arguments: list[str] | None = None) -> int:
     out = options.out or (ROOT / "build" / "benchmarks" / "quick" if options.quick else None)
     folder = out / "results" if out else ROOT / "benchmarks" / "results"
     folder.mkdir(parents=True, exist_ok=True)
-    now = None if options.draw else state()
     for name in [] if options.draw else options.parts or known:
         print(f"benchmarks: {name}", file=sys.stderr, flush=True)
-        content = {"state": now, "result": known[name]()}
+        content = {"state": state(), "result": known[name]()}
         (folder / f"{name}.json").write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
     found = {name: json.loads(path.read_text()) for name in known if (path := folder / f"{name}.json").is_file()}
+    machines = {content["state"]["machine"] for content in found.values()}
+    if len(machines) != 1:
+        parser.error(
+            f"{folder} has results of {len(machines)} machines{': ' * bool(machines)}{'; '.join(sorted(machines))}. A "
+            "page is of one: measure the others anew, or delete their files."
+        )
     target = (out or ROOT / "docs") / "benchmarks.md"
-    commits = {content["state"]["commit"]: content["state"] for content in found.values()}
-    if now is None:
-        if len(commits) != 1:
-            parser.error(
-                f"{folder} has results of {len(commits)} commits{': ' * bool(commits)}{', '.join(commits)}. A page is "
-                "of one: measure the others anew, or delete their files."
-            )
-        (now,) = commits.values()
-    same = {name: content["result"] for name, content in found.items() if content["state"]["commit"] == now["commit"]}
-    page.write(same, now, target)
+    page.write(found, target)
     print(target)
     return 0
 

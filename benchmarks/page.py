@@ -31,11 +31,8 @@ def measured(value: Sequence[float], factor: float = 1.0) -> str:
     return f"{middle} ({low} … {high})"
 
 
-def write(results: Mapping[str, Result], state: Mapping[str, str], page: Path) -> None:
-    """Write the page from the results of the parts that were measured, and its figures beside it."""
-    head = Path(__file__).with_name("page.md").read_text(encoding="utf-8")
-    for name, value in state.items():
-        head = head.replace(f"@{name.upper()}@", value)
+def write(parts: Mapping[str, Result], page: Path) -> None:
+    """Write the page from the parts that were measured, each a state and a result, and its figures beside it."""
     sections = {
         "work_precision": _work_precision,
         "coupling": _coupling,
@@ -44,11 +41,15 @@ def write(results: Mapping[str, Result], state: Mapping[str, str], page: Path) -
         "preparation": _preparation,
     }
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
-    summary = _summary(results["work_precision"]) if "work_precision" in results else []
-    lines = [head.rstrip().replace("@SUMMARY@", "\n".join(summary))]
+    summary = _summary(parts["work_precision"]["result"]) if "work_precision" in parts else []
+    machine = next(iter(parts.values()))["state"]["machine"]
+    head = Path(__file__).with_name("page.md").read_text(encoding="utf-8").rstrip()
+    lines = [head.replace("@MACHINE@", machine).replace("@SUMMARY@", "\n".join(summary))]
     for name, section in sections.items():
-        if name in results:
-            lines += ["", *section(results[name], page.parent / "images")]
+        if name in parts:
+            heading, *text = section(parts[name]["result"], page.parent / "images")
+            state = parts[name]["state"]
+            lines += ["", heading, "", f"Measured at commit {state['commit']} on {state['date']}.", *text]
     page.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

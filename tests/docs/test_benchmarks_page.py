@@ -1,4 +1,4 @@
-"""The page of the benchmarks is what its results say, and no results of two commits make one."""
+"""The page of the benchmarks is what its results say, and no results of two machines make one."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def test_page_of_the_benchmarks_is_drawn_from_its_results(tmp_path: Path, capsys
     assert drawn == sorted(path.name for path in (ROOT / "docs" / "images").glob("bench_*"))
     other = tmp_path / "results" / "coupling.json"
     found = json.loads(other.read_text(encoding="utf-8"))
-    found["state"]["commit"] = "another"
+    found["state"]["machine"] = "another"
     other.write_text(json.dumps(found), encoding="utf-8")
     with pytest.raises(SystemExit):
         main(["--draw", "--out", str(tmp_path)])
-    assert "results of 2 commits: " in capsys.readouterr().err
+    assert "results of 2 machines: " in capsys.readouterr().err
 
 
 def test_page_on_effects_says_what_was_measured_of_waviness() -> None:
