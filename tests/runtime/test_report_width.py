@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -31,3 +32,11 @@ def test_modes_and_matrices_of_the_press_fit_80_columns_and_have_names(press: Mo
     text = to_text(press.linearize()._report())
     assert max(map(len, text.splitlines())) <= 80
     assert all(word in text for word in ("natural", "damping", "stiffness", "mass"))
+
+
+def test_tables_of_states_fit_80_columns_and_say_what_the_states_are(make_model: Callable[..., Model]) -> None:
+    section = make_model("rotor_two_bearings").section(readings=40, settling=5)
+    for text in (to_text(section._report()), to_text(make_model("varying_compliance").steady()._report())):
+        assert max(map(len, text.splitlines())) <= 80
+        (row,) = [line for line in text.splitlines() if re.match(r" (free_end\.)?inner\.vx ", line)]
+        assert "Velocity of the inner ring" in row

@@ -9,7 +9,6 @@ manifest's own descriptions, shortened.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,19 +16,8 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.ratings.elements import RatedElement
 from ballpass.runtime.ratings.of_bearing import contacts_of, rated_element
 from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.report.short_words import short_words
 from ballpass.runtime.run.driver_angle import crank_angle
-
-#: What shortens a description, in this order.
-_SHORTER = (
-    (r"^(Force|Moment) of the \S+ on the ", r"\1 on the "),
-    (r"^Position of the centre of the ", ""),
-    (r"^Velocity of the centre of the ", "Velocity of the "),
-    (r"^Torque of the drive.*", "Torque of the drive"),
-    (r"^External load on", "Load on"),
-    (r"(, r_b/.*)?, Eq\. .*", ""),
-    (r", counter-clockwise$", ""),
-    (r" along (x|y)$", r", \1"),
-)
 
 #: Words of what the summary adds to states, outputs and constants; those of one bearing of several name it.
 _ADDED = {
@@ -69,9 +57,7 @@ def row_words(manifest: Manifest, name: str) -> str:
     found = next((info.description for info in infos if info.name == name), "")
     paths = {f"{bearing.path}.{own}" for bearing in manifest.bearings if bearing.prefix == prefix}
     found = found or next((info.description for info in manifest.constants if info.name in paths), name)
-    for pattern, short in _SHORTER:
-        found = re.sub(pattern, short, found)
-    found = found[:1].upper() + found[1:]
+    found = short_words(found)
     return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
 
 

@@ -21,6 +21,7 @@ from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.report.short_words import short_words
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
@@ -52,7 +53,7 @@ class PoincareSection(ShortRepr, Reported):
 
     Attributes
     ----------
-    names, units : of the states
+    names, units, descriptions : of the states
     row : of the state that is shown
     angle : of driver or shaft since t = 0 [deg]
     states : points, shape (readings, states)
@@ -69,6 +70,7 @@ class PoincareSection(ShortRepr, Reported):
 
     names: tuple[str, ...]
     units: tuple[str, ...]
+    descriptions: tuple[str, ...]
     row: int
     angle: float
     states: np.ndarray
@@ -106,7 +108,7 @@ class PoincareSection(ShortRepr, Reported):
         fitted = self.curve is not None
         table = ReportTable(
             title=f"{len(self.states)} points, one a turn, at {self.angle:g} deg: {self.kind}",
-            heads=("state", "least", "largest", "unit", *(("distance from the curve",) if fitted else ())),
+            heads=("state", "least", "largest", "unit", *(("off curve",) if fitted else ()), "what"),
             rows=[
                 (
                     name,
@@ -114,16 +116,19 @@ class PoincareSection(ShortRepr, Reported):
                     f"{factor * column.max():z.6g}",
                     shown_unit,
                     *((f"{100.0 * share:.2g} %",) if fitted else ()),
+                    short_words(description),
                 )
-                for name, (factor, shown_unit), column, share in zip(
+                for name, (factor, shown_unit), column, share, description in zip(
                     self.names,
                     map(table_unit, self.units),
                     self.states.T,
                     missed.tolist(),
+                    self.descriptions,
                     strict=True,
                 )
             ],
-            right=("least", "largest", "distance from the curve")[: 3 if fitted else 2],
+            right=("least", "largest", "off curve")[: 3 if fitted else 2],
+            wrapped=("what",),
         )
         parts: list[str | ReportTable] = [table]
         if self.curve is not None:
@@ -131,8 +136,8 @@ class PoincareSection(ShortRepr, Reported):
             around = f", so that they go round once in {1.0 / abs(drift):.4g} turns" if drift else ""
             parts.append(
                 f"From turn to turn the balls move by {drift:.6g} of a ball pitch beyond whole pitches{around}. The "
-                f"curve has {self.curve.harmonics} harmonics, fitted to every second point; distances are those of "
-                "the others, in shares of the points' spread."
+                f"curve has {self.curve.harmonics} harmonics, fitted to every second point; off curve: how far "
+                "the others are from it, in shares of the points' spread."
             )
         if self.kind == "on a closed curve":
             parts.append(
@@ -235,6 +240,7 @@ def section(
     return PoincareSection(
         names=names,
         units=tuple(info.unit for info in manifest.states),
+        descriptions=tuple(info.description for info in manifest.states),
         row=names.index(state),
         angle=angle,
         states=run.x,

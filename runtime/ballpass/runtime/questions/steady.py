@@ -17,6 +17,7 @@ from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.report.short_words import short_words
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
@@ -80,7 +81,7 @@ class SteadyState(ShortRepr, Reported):
 
     Attributes
     ----------
-    states, units : names and SI units
+    states, units, descriptions : names, SI units and what they are
     period : after which the state is there again [s]
     turns : the same in turns of driver or shaft, NaN where nothing turns [1]
     forcing : what happens in a period of the equations
@@ -108,6 +109,7 @@ class SteadyState(ShortRepr, Reported):
 
     states: tuple[str, ...]
     units: tuple[str, ...]
+    descriptions: tuple[str, ...]
     period: float
     turns: float
     forcing: str
@@ -168,17 +170,19 @@ class SteadyState(ShortRepr, Reported):
         turns = "" if math.isnan(self.turns) else f", {self.turns:.10g} turns"
         table = ReportTable(
             title=f"State at t = 0 that repeats after {self.period:.10g} s{turns}",
-            heads=("state", "start", "unit"),
+            heads=("state", "start", "unit", "what"),
             rows=[
-                (name, f"{factor * start:z.10g}", shown_unit)
-                for name, (factor, shown_unit), start in zip(
+                (name, f"{factor * start:z.10g}", shown_unit, short_words(description))
+                for name, (factor, shown_unit), start, description in zip(
                     self.states,
                     map(table_unit, self.units),
                     self.start.tolist(),
+                    self.descriptions,
                     strict=True,
                 )
             ],
             right=("start",),
+            wrapped=("what",),
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
         lost = len(self.multipliers) - len(known)
@@ -317,6 +321,7 @@ def steady(
     return SteadyState(
         states=tuple(info.name for info in manifest.states),
         units=tuple(info.unit for info in manifest.states),
+        descriptions=tuple(info.description for info in manifest.states),
         period=repeats * length,
         turns=repeats * length / turn if math.isfinite(turn) else math.nan,
         forcing=period.words,
