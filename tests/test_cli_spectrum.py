@@ -13,6 +13,7 @@ from matplotlib.image import imread
 from typer.testing import Result
 
 from ballpass.runtime import load
+from ballpass.runtime.ask.spectrum import amplitude_spectrum
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "rotor.toml"
 
@@ -57,6 +58,21 @@ def test_tables_name_the_lines_in_frequencies_orders_and_envelopes(
         assert ("envelope of 2000 to 8000 Hz" in done.stdout) == ("--envelope" in words)
         place, _, names = done.stdout.rpartition("results in ")[2].strip().partition(": ")
         assert all((Path(place) / name).is_file() for name in names.split(", "))
+
+
+def test_a_table_says_how_low_its_heights_may_read(ballpass: Callable[..., Result], signal: Path) -> None:
+    """The least reading of a sine anywhere between two lines, by transforms of the sines themselves."""
+    turns = 2.0 * math.pi * np.arange(512) / 512
+    for window in ("boxcar", "hann", "blackmanharris", "flattop"):
+        read = [
+            np.max(amplitude_spectrum(turns, np.sin((60.0 + part) * turns), window=window).amplitude)
+            for part in np.linspace(0.0, 1.0, 41)
+        ]
+        done = ballpass("spectrum", signal, "--of", "inner.ay", "--window", window, "--no-figures")
+        assert done.exit_code == 0, done.output
+        said = " ".join(done.stdout.split())
+        assert ("reads up to" in said) == (min(read) < 0.99)
+        assert (f"reads up to {100 * (1 - min(read)):.0f} % low" in said) == (min(read) < 0.99)
 
 
 @pytest.mark.long

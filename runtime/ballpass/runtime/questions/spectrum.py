@@ -34,6 +34,10 @@ WIDTHS = 3.0
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
+#: Samples of the window whose reading between two lines is computed, and the least reading of which nothing is said.
+SAMPLES = 1000
+LEAST_READING = 0.99
+
 #: What the short names of characteristic frequencies stand for.
 MEANINGS = {
     "FTF": "turns of the cage",
@@ -207,6 +211,12 @@ class SignalSpectrum(ShortRepr, Reported):
             f"rms {factor * s.rms:.4g} {shown}, peak {factor * s.peak:.4g} {shown}, crest factor {s.crest_factor:.3g}, "
             f"kurtosis {s.kurtosis:.3g}, skewness {s.skewness:.3g}"
         )
+        if self.scaling != "density" and (low := _lowest_reading(self.window)) < LEAST_READING:
+            low = low if self.scaling == "amplitude" else low**2
+            said.append(
+                f"window {self.window}: the height of a frequency between two lines reads up to "
+                f"{100 * (1 - low):.0f} % low; --window flattop reads it right"
+            )
         if self.envelope is not None:
             low, high = self.envelope
             chosen = "" if self.kurtosis is None else f", chosen by its kurtosis of {self.kurtosis:.3g}"
@@ -225,6 +235,14 @@ class SignalSpectrum(ShortRepr, Reported):
             "figure": None,  # the command puts the file here
         }
         return Report(parts=(table, *said), facts=facts, records=rows, warnings=self.warnings)
+
+
+def _lowest_reading(window: str) -> float:
+    """Height that a sine of amplitude 1 has midway between two lines."""
+    from ballpass.runtime.ask.spectrum import window_weights
+
+    weights = window_weights(window, SAMPLES)
+    return float(abs(np.exp(1j * np.pi * np.arange(SAMPLES) / SAMPLES) @ weights) / np.sum(weights))
 
 
 def _check(values: Mapping[str, Any]) -> None:
