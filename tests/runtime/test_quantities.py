@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 
 ENSEMBLE = [
@@ -176,6 +177,15 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
     # the torque steps with its load: amplitudes fall like 1/k, and 40 of them leave about a hundredth of the square
     assert square == pytest.approx(found["rms:drive_torque"] ** 2, rel=0.02)
     assert square < found["rms:drive_torque"] ** 2
+
+
+def test_the_frequency_of_a_cage_between_rings_moves_with_the_balls_whichever_ring_turns(
+    make_model: Callable[..., Model],
+) -> None:
+    """Thicker balls slow the cage that an inner ring turns, and speed up the other one: the slope was that of BPFO."""
+    model = make_model("varying_compliance", ("[shaft]\n", '[shaft]\nring = "outer"\n'))
+    report = model.sensitivity(["amplitude:inner.x@cage"], ["bearing.ball_diameter"], cycles=3, transient=1)
+    assert [pair.check.verdict for pair in report.pairs] == [Verdict.VERIFIED]
 
 
 @pytest.mark.parametrize(

@@ -149,8 +149,10 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
         of = bearing.ring_speed
     elif what == "ball_pass_inner":
         of = f"{at}.inner_pass_speed"
+    elif what != "cage" and f"{at}.outer_pass_speed" in values:  # of an outer ring that turns
+        of = f"{at}.outer_pass_speed"
     else:
-        of = f"{at}.outer_pass_speed" if f"{at}.outer_pass_speed" in values else f"{at}.cage_speed"
+        of = f"{at}.cage_speed"
     slope = frequency / values[of] * view.slopes(of) if values[of] else 0.0 * view.slopes(of)
     if what == "ball_spin":  # in proportion to cos(contact angle) + pitch/ball
         ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
