@@ -10,12 +10,12 @@ import pytest
 from scipy.integrate import quad
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.life_report import life_report
+from ballpass.runtime.ask.life_report import _oscillation, life_report
 from ballpass.runtime.ask.wear import LoadSamples, wear_field
 from ballpass.runtime.contract import DutyInfo, LubricationInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings import groove_slip, life
-from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of
+from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of
 from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run.request import Request
@@ -124,6 +124,25 @@ def test_a_bearing_that_swings_has_no_life_and_the_others_have(make_model: Calla
 
 def contact(model: Model) -> RacewayContact:
     return contacts_of(model.manifest.bearings[0], model.numbers({}).values)[0]
+
+
+def test_contacts_at_an_angle_are_nearer_to_the_middle_of_a_bearing_that_swings(press: Model) -> None:
+    """A swing of the dither amplitude moves the shorter-moved contact by its length; radii were 1/cos(angle) of it."""
+    info, angle, load = press.manifest.bearings[0], np.radians(40.0), 2000.0
+    cosines = {"bearing.contact_angle": angle, "bearing.cos_contact_angle": np.cos(angle)}
+    values = {**press.numbers().values, **cosines}
+    time = np.linspace(0.0, 1.0, 101)
+    still = {"time": time, "crank": time, "force": np.full((101, 8), load), "resultant": np.full(101, load)}
+    samples = LoadSamples(**still, in_outer=0.1 * np.sin(time), in_inner=-0.1 * np.sin(time))
+    found = _oscillation(info, values, ratings_of(info, values), samples, load, load)
+    assert found is not None
+    ball, pitch = values["bearing.ball_diameter"], values["bearing.pitch_diameter"]
+    share, ways = ball * np.cos(angle) / pitch, []
+    for sign, ring in zip((1.0, -1.0), contacts_of(info, values), strict=True):
+        # to and fro, while the cage moves by half of (1 -+ gamma) against the ring
+        way = 2.0 * found.dither * 0.5 * (1.0 + sign * share) * (pitch / 2.0) * (1.0 - sign * share)
+        ways.append(way / (2.0 * ring.semi_axes(load)[1]))
+    assert min(ways) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_a_pass_wears_off_what_pressure_and_slip_give(press: Model) -> None:

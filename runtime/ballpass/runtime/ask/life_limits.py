@@ -26,7 +26,12 @@ DENSITY, CENTRIFUGAL = 7800.0, 0.1
 
 
 def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStrength) -> Iterator[str]:
-    """What the bearing is beyond."""
+    """What the bearing is beyond.
+
+    Parameters
+    ----------
+    values : parameters and derived constants by name, with the driver at speed
+    """
     element, geometry = rated_element(info), geometry_of(info, values)
     noun = element.noun
     load, dynamic, static = found.equivalent_load, found.dynamic_rating, found.static_rating
@@ -51,7 +56,7 @@ def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStre
     if found.static_safety < 1.0:
         yield f"the static safety s_0 = {found.static_safety:.2g} is below 1, the least of ISO 76."
     pitch, speed = float(geometry.pitch), abs(found.speed)
-    cage = 0.5 * (1.0 + geometry.gamma if info.inner_stands else 1.0 - geometry.gamma) * speed
+    cage = speed and speed * values[f"{info.path}.cage_speed"] / values[info.ring_speed]
     centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * cage**2
     share = 5.0 * load / info.balls
     if centrifugal > CENTRIFUGAL * share > 0.0:  # without a load there is no life that it could shorten

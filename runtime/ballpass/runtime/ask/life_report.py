@@ -143,7 +143,7 @@ def _bearing(
     tilt = _tilt(info, values, load)
     return replace(
         strength,
-        beyond=(*limits_of(info, values, strength), *filter(None, (tilt.beyond,))),
+        beyond=(*limits_of(info, moving, strength), *filter(None, (tilt.beyond,))),
         oscillation=_oscillation(info, values, ratings, samples, load, force) if why and turning else None,
         tilt=tilt,
     )
@@ -163,8 +163,10 @@ def _oscillation(
         return None
     geometry = geometry_of(info, values)
     lengths = [float(contact.semi_axes(force)[1]) for contact in contacts_of(info, values)]
+    across = float(geometry.cosine * geometry.diameter)  # the circles of contacts are so far apart, less at an angle
     inner, outer = (
-        (length, abs(float(geometry.raceway_radius(sign)))) for length, sign in zip(lengths, (1.0, -1.0), strict=True)
+        (length, 0.5 * (float(geometry.pitch) - sign * across))
+        for length, sign in zip(lengths, (1.0, -1.0), strict=True)
     )
     return oscillation(
         amplitude,

@@ -70,7 +70,8 @@ def oscillation(
     load, dynamic_rating : P, C_r [N]
     exponent : p, 3 for balls
     balls, gamma : Z, D_w cos α/D_pw
-    contacts : half length along the way of the ball and radius of the raceway, of inner and outer ring [m]
+    contacts : half length along the way of the ball and radius of the circle of contacts about the bearing's axis, of
+        inner and outer ring [m]
     """
     equivalent = (2.0 * amplitude / math.pi) ** (1.0 / exponent) * load
     life = MILLION * (dynamic_rating / equivalent) ** exponent if load > 0.0 else math.inf
