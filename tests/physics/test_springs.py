@@ -102,3 +102,20 @@ def test_a_cubic_stiffness_goes_with_a_stiffness(scene_text: Callable[..., str])
     with pytest.raises(SceneError) as caught:
         scene_from_text(scene_text("crank_shaper", *changes(alone)), "shaper")
     assert [fault.key for fault in caught.value.faults] == ["mechanism.springs.return.cubic_stiffness"]
+
+
+def test_a_torsion_spring_that_jumps_is_said(make_model: Callable[..., Model]) -> None:
+    """Counted in a finely sampled turn, in which the torque jumps by stiffness times a turn."""
+    outputs = (OUTPUTS[0], OUTPUTS[1].replace('"spring.*", ', ""))
+    model = make_model(
+        "crank_shaper", *changes(TWIST, TWIST.replace("twist", "wound").replace("lever", "crank")), outputs
+    )
+    for free in (math.radians(80.0), math.radians(-95.0)):
+        numbers = {"mechanism.torsion_springs.twist.free_angle": free}
+        run, limits = model.simulate(cycles=1.0, parameters=numbers), model.explain(numbers).limits
+        for name in ("twist", "wound"):
+            torque = run[f"torsion_spring.{name}.torque"]
+            jumps = np.count_nonzero(np.abs(torque - np.roll(torque, 1)) > 30.0 * np.pi)
+            assert model.constants(numbers)[f"torsion_spring.{name}.jumps"] == jumps
+            said = [words for words in limits if f"torsion_spring.{name}: its torque jumps" in words]
+            assert len(said) == (jumps > 0) == (name == "wound" or free < 0.0)

@@ -76,6 +76,12 @@ class Linkage:
     play: Play
 
     @property
+    def positions(self) -> tuple[sp.Basic, ...]:
+        """The coordinates of play: zero in the ideal linkage."""
+        found = {symbol for motion in self.play.values() for e in motion.position for symbol in e.free_symbols}
+        return tuple(sp.ordered(found))
+
+    @property
     def dyads(self) -> tuple[Dyad, ...]:
         """In the order of assembly."""
         return tuple(p.dyad for p in self.placements)

@@ -9,10 +9,12 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import cross, dot
+from ballpass.derive.mechanism.kinematics import cross, dot, subscript
+from ballpass.derive.mechanism.swing import Jumps
 from ballpass.derive.scene.body_keys import BODIES
 from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force
+from ballpass.derive.terms import Definition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +38,17 @@ class TwoBodies(Pathway):
         def excess(free: sp.Expr) -> sp.Expr:
             from_free = (sp.cos(free), sp.sin(free))
             turned = (dot(first, second), cross(first, second))
-            return sp.atan2(cross(from_free, turned), dot(from_free, turned))
+            sin, cos = cross(from_free, turned), dot(from_free, turned)
+            setting.constants.append(
+                Definition(
+                    symbol=sp.Symbol(f"{force.label}.jumps", real=True),
+                    expression=Jumps(cos, sin, *setting.linkage.positions),
+                    unit="1",
+                    description=f"Jumps of the angle of {force.name} by a turn, in a turn of the driver",
+                    latex=rf"n_{{{subscript(force.name)}}}",
+                )
+            )
+            return sp.atan2(sin, cos)
 
         def loads(torque: sp.Expr) -> tuple[AppliedLoad, ...]:
             signed = zip(self.bodies, (torque, -torque), strict=True)
