@@ -159,6 +159,15 @@ def test_a_pass_wears_off_what_pressure_and_slip_give(press: Model) -> None:
     assert depth_of_pass(rolling, load, ring) == pytest.approx(0.0, abs=1e-9 * depth_of_pass(0.0, load, ring))
 
 
+@pytest.mark.long
+def test_wear_of_a_long_run_with_few_samples_is_that_of_a_short_one(make_model: Callable[..., Model]) -> None:
+    """Under a load that stands; samples more than half a turn of the balls apart gave a third, or less."""
+    model = make_model("varying_compliance", ("samples_per_cycle = 2000", "samples_per_cycle = 16"))
+    short, long = (model.life(cycles=cycles, transient=2).bearings[0] for cycles in (66, 2500))
+    for ring in ("inner", "outer"):
+        assert getattr(long, ring).wear[0] / getattr(short, ring).wear[0] == pytest.approx(1.0, rel=0.1)
+
+
 def test_wear_of_an_even_load_is_that_of_a_pass_times_the_passes(press: Model) -> None:
     ring, load, speed, balls = contact(press), 500.0, -7.3, 8
     time = np.linspace(0.0, 40.0, 40001)

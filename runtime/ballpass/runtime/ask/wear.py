@@ -23,8 +23,9 @@ from ballpass.runtime.run.segments import time_resolution
 
 Array = NDArray[np.float64]
 
-#: Turns whose samples wear and the equivalent load of ISO 281 have; a longer run has as many, farther apart.
-SAMPLED_TURNS = 64
+#: Turns whose samples wear and the equivalent load of ISO 281 have; a longer run has as many, farther apart, but in a
+#: turn so many at least: balls pass less than half a turn of either ring between two, else how far is not known.
+SAMPLED_TURNS, LEAST_IN_TURN = 64, 8
 
 #: Places across the groove where wear is computed, from its middle to the edge of the widest contact.
 ACROSS = 41
@@ -89,7 +90,9 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
     steady = run.end - run.start
     turns = steady / run.turn if turns is None else turns
     # odd: in any whole number of turns two samples differ in the driver's angle, also where a turn has few of them
-    count = 2 * max(int(manifest.run.samples_per_cycle * min(turns or 1.0, SAMPLED_TURNS)) // 2, 2) + 1
+    whole = turns or 1.0
+    several = max(manifest.run.samples_per_cycle * min(whole, SAMPLED_TURNS), LEAST_IN_TURN * whole)
+    count = 2 * max(int(several) // 2, 2) + 1
     time = run.start + steady * np.arange(count) / count
     near = time_resolution(run.begin, run.end, run.turn)
     samples = Samples(times=time, x=np.empty((count, len(model.states))), near=near, end=run.end)
