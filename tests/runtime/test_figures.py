@@ -198,6 +198,21 @@ def test_caption_says_how_the_run_was_made(press: Run, name: str) -> None:
         assert words in text
 
 
+@pytest.mark.long
+def test_a_share_of_the_reaction_is_not_drawn_as_the_load_where_the_scene_gives_one_beside_it(
+    make_virtual: Callable[..., Model],
+) -> None:
+    """5 kN more than the arrow showed; where the load is an output it is drawn."""
+    given = '[load]\ntype = "constant"\nforce = ["5 kN", "0 N"]\n\n[run]\n'
+    kept = '"outer.*", "ball.*", "reaction.A.*"'
+    for more, drawn in (("", False), (', "load.*"', True)):
+        model = make_virtual("punching_press", ("[run]\n", given), (kept, kept + more))
+        load = gather(model, model.simulate(cycles=0.01, transient=0)).ring_load()
+        assert (load is not None) is drawn
+        if load is not None:
+            assert load[0, 0] > 4.5e3
+
+
 def test_load_curve_shows_reaction_and_half_of_it_over_one_turn(press: Run) -> None:
     figure = draw("load_curve", *press)
     solution = press[1].steady()

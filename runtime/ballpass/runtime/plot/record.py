@@ -200,17 +200,23 @@ class Record:
         values, path = self.solution.parameters, "" if self.bearing is None else self.bearing.path
         return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
 
+    @property
+    def loaded_by_joint(self) -> bool:
+        """Whether the bearing's load is its share of a joint's reaction alone: the scene gives none beside it."""
+        given = any(name.startswith(("load.", "loads.")) for name in self.solution.parameters)
+        return self.manifest.mechanism is not None and not given
+
     def ring_load(self) -> Array | None:
-        """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None without both."""
+        """Load on the inner ring, (n, 2) [N]: the output, else the reaction's share; None where neither is known."""
         if self.has("load.x", "load.y"):
             return np.column_stack((self.values("load.x"), self.values("load.y")))
-        mechanism, bearing = self.manifest.mechanism, self.bearing
-        if mechanism is None or bearing is None:
+        bearing = self.bearing
+        if bearing is None or not self.loaded_by_joint:
             return None
         names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
         if not self.has(*names):
             return None
-        first = next(item[2] for item in mechanism.joints if item[0] == bearing.joint)
+        first = next(item[2] for item in self.mechanism.joints if item[0] == bearing.joint)
         # Eq. (2): the force on the outer ring's body presses the ring; the reaction is that of the second body on the
         # first
         share = self.bearing_share() * (-1.0 if first == bearing.inner_body else 1.0)
