@@ -10,9 +10,10 @@ import pytest
 from scipy import signal as scipy_signal
 
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, envelope, order_spectrum, spectrogram
-from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, names_of
+from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, mean_speeds, names_of
 from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
 TURN = 2.0 * np.pi
@@ -117,6 +118,23 @@ def test_a_cage_that_slips_moves_its_lines(make_model: Callable[..., Model]) -> 
     for what in ("cage", "ball_pass_outer", "ball_spin"):
         assert getattr(slipping, what) == pytest.approx(0.98 * getattr(rolling, what), rel=1e-12)
     assert slipping.ball_pass_inner + slipping.ball_pass_outer == pytest.approx(8 * 50.0, rel=1e-12)
+
+
+def test_lines_of_a_cage_whose_slip_changes_are_those_of_its_mean_over_the_run(
+    make_virtual: Callable[..., Model],
+) -> None:
+    """They were those of the last slip, which a run need not reach: of none, then a fifth after its end."""
+    slip = '[bearing.cage]\nslip = { time = ["0 s", "0.03 s"], value = [0.0, 0.2] }\n\n[bearing.initial]'
+    model = make_virtual("rotor", ("[bearing.initial]", slip))
+    rolling, bearing = 50.0 * model.constants()["bearing.cage_ratio"], model.manifest.bearings[0]
+    for begin, end, mean in ((0.0, 0.02, 0.0), (0.01, 0.04, 0.2 / 3.0), (0.05, 0.1, 0.2)):
+        values = mean_speeds(model.manifest, model.numbers().values, np.array([begin, 0.5 * (begin + end), end]))
+        found = frequencies_of(bearing, values)
+        assert found.cage == pytest.approx(rolling * (1.0 - mean), rel=1e-9)
+        assert found.ball_pass_outer == pytest.approx(8 * rolling * (1.0 - mean), rel=1e-9)
+        assert found.ball_pass_inner == pytest.approx(8 * (50.0 - rolling * (1.0 - mean)), rel=1e-9)
+    solution = model.simulate(duration=0.02, transient=0)
+    assert summarize(model, solution)["frequencies"]["cage"] == pytest.approx(rolling, rel=1e-9)
 
 
 def test_lines_are_named_by_what_turns(make_model: Callable[..., Model]) -> None:

@@ -31,7 +31,7 @@ from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
-from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
@@ -344,7 +344,8 @@ def _constants(sol: Solution) -> dict[str, Any]:
         mechanism = sol.manifest.mechanism
         even = mechanism is None or not mechanism.angle
         if even and speed != 0.0:  # rings that only swing against each other pass no ball
-            frequencies = frequencies_of(bearing, {**sol.parameters, **sol.constants})
+            values = mean_speeds(sol.manifest, {**sol.parameters, **sol.constants}, sol.t)
+            frequencies = frequencies_of(bearing, values)
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found

@@ -146,7 +146,7 @@ def spectra(record: Record) -> Figure:
         )
         for axis in "xy"
     }
-    marks = record.frequencies()
+    marks = source.frequencies()
     shaft, ball_pass = (marks.shaft, marks.ball_pass_outer) if marks is not None else (0.0, 0.0)
     peak = max(float(np.max(s.amplitude)) for s in lines.values())
     floor = max(peak * 1e-4, 1e-12)

@@ -17,7 +17,7 @@ from ballpass.runtime.ask.observables import turns
 from ballpass.runtime.contract import force_components, table_direction
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import rated_element
 from ballpass.runtime.run.ball_angles import ball_angles
@@ -154,7 +154,8 @@ class Record:
         bearing, mechanism = self.bearing, self.manifest.mechanism
         if bearing is None or (mechanism is not None and mechanism.angle):
             return None
-        return frequencies_of(bearing, {**self.solution.parameters, **self.solution.constants})
+        values = {**self.solution.parameters, **self.solution.constants}
+        return frequencies_of(bearing, mean_speeds(self.manifest, values, self.t))
 
     def ball_angles(self, sample: int) -> Array:
         """Angles of the balls at a sample, (balls,) [rad]."""

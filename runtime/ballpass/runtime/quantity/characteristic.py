@@ -11,6 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
@@ -29,6 +31,9 @@ NEARLY_AS_SIMPLE, SIMPLE, MOST_NEAR = 2, 8, 2
 #: Turns of a spectrum at least; its lines between ball pass and the nearest harmonic of the shaft, with room for the
 #: window's width; and the most turns that these may cost.
 TURNS, APART, MOST = 100, 5.0, 400
+
+#: Speeds of the balls over both rings, behind the path of a bearing.
+PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
 
 #: Channels of a linkage begin with these.
 LINKAGE = ("reaction.", "drive_", "driver.", "body.", "point.", "spring.", "stop.")
@@ -117,6 +122,22 @@ def characteristic_lines(
             for name, f, side, of in lines
         ]
     return tuple(found)
+
+
+def mean_speeds(manifest: Manifest, values: Mapping[str, float], times: np.ndarray) -> Mapping[str, float]:
+    """The values with speeds of cages whose slip changes as means from the first to the last of the times [s].
+
+    They are those of the slip in the end, which a run need not reach.
+    """
+    found, ends = dict(values), times[[0, -1]]
+    for bearing in manifest.bearings:
+        for item in manifest.inputs:
+            if item.name == f"{bearing.prefix}cage.lag" and ends[1] > ends[0]:
+                (first,), (last,) = driver_angle.inputs_over([item], values, ends, ends)
+                for name in (f"{bearing.path}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS)):
+                    if name in found:
+                        found[name] -= float((last - first) / (ends[1] - ends[0]))
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

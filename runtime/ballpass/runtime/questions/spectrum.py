@@ -266,13 +266,13 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     title = f"{solution.manifest.title}: {what}"
     if found.spectrogram:
         from ballpass.runtime.ask.vibration import envelope, spectrogram
-        from ballpass.runtime.quantity.characteristic import characteristic_lines
+        from ballpass.runtime.quantity.characteristic import characteristic_lines, mean_speeds
 
         signal = solution[found.of]
         values = envelope(solution.t, signal, band) if band else signal
         length = float(solution.t[-1] - solution.t[0])
         over_time = spectrogram(solution.t, values, segment=length / SEGMENTS, window=found.window)
-        numbers = {**solution.parameters, **solution.constants}
+        numbers = mean_speeds(solution.manifest, {**solution.parameters, **solution.constants}, solution.t)
         orders = characteristic_lines(solution.manifest, numbers, orders=True)
         speed = np.zeros(len(over_time.time))
         if orders:
@@ -339,7 +339,7 @@ def spectrum(
     from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
     from ballpass.runtime.ask.vibration import envelope as envelope_of
     from ballpass.runtime.ask.vibration import kurtogram as kurtogram_of
-    from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines
+    from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines, mean_speeds
     from ballpass.runtime.run.solution import Solution
 
     if isinstance(model, Solution):
@@ -371,7 +371,7 @@ def spectrum(
         run = replace(run, outputs={**run.outputs, of: _measured(run, of, sensor)})
     solution = run.steady()
     signal = solution[of]
-    numbers = {**solution.parameters, **solution.constants}
+    numbers = mean_speeds(solution.manifest, {**solution.parameters, **solution.constants}, solution.t)
     kurtosis = None
     if kurtogram:
         fastest = max((mark.frequency for mark in characteristic_lines(solution.manifest, numbers)), default=0.0)
