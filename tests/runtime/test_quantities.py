@@ -179,6 +179,17 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
     assert square < found["rms:drive_torque"] ** 2
 
 
+@pytest.mark.long
+def test_the_shaft_of_a_bearing_that_swings_is_the_driver(make_model: Callable[..., Model]) -> None:
+    """Its rings have no mean speed against each other: the amplitude was that at 0 Hz, about nothing."""
+    model = make_model("punching_press_hinges")
+    found = values(model, ["amplitude:pin.inner.x@shaft", "amplitude:pin.inner.x@1x"], cycles=2, transient=1)
+    assert found["amplitude:pin.inner.x@shaft"] == found["amplitude:pin.inner.x@1x"] > 1e-9
+    for what in ("cage", "bpfo", "bpfi", "bsf"):
+        with pytest.raises(RequestError, match=r"bearings\.pin do not turn against each other"):
+            values(model, [f"amplitude:pin.inner.x@{what}"], cycles=2, transient=1)
+
+
 def test_the_frequency_of_a_cage_between_rings_moves_with_the_balls_whichever_ring_turns(
     make_model: Callable[..., Model],
 ) -> None:

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
-from ballpass.runtime.ratings.of_bearing import contact_cosine
+from ballpass.runtime.ratings.of_bearing import TURNS, contact_cosine
 from ballpass.runtime.run import driver_angle
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
@@ -89,10 +89,23 @@ def check_instant(manifest: Manifest, _values: Mapping[str, float], quantity: Qu
         _refuse_driven(manifest, quantity, "passes an angle when its motion does. Name a time instead, as in @0.41s")
 
 
-def check_frequency(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
-    """Raise `RequestError` for a frequency that depends on the speed where the driver's changes."""
+def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
+    """Raise `RequestError` for a frequency of a speed that changes, or of a bearing whose rings only swing."""
     if not quantity.place.endswith("Hz"):
         _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
+    if quantity.place in _FREQUENCIES and quantity.place != "shaft":
+        bearing = _bearing_of(manifest, quantity)
+        if abs(values[bearing.ring_speed]) <= TURNS * abs(driver_angle.shaft_speed(manifest, values)):
+            raise RequestError(
+                f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that no ball passes "
+                "at a frequency of its own. Allowed: @shaft, an order as in @2x, a frequency as in @250Hz."
+            )
+
+
+def _bearing_of(manifest: Manifest, quantity: Quantity) -> BearingInfo:
+    """The bearing of the channel, else the first."""
+    ours = (one for one in manifest.bearings if one.prefix and quantity.channel.startswith(one.prefix))
+    return next(ours, manifest.bearings[0])
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
@@ -137,17 +150,13 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     name = driver_angle.speed_name(manifest)
     assert name is not None  # something turns
     faster = view.slopes(name)
-    if form is not None:
-        order = float(form["number"])
+    if form is not None or place == "shaft":
+        order = 1.0 if form is None else float(form["number"])
         return order * abs(speed) / driver_angle.TURN, order * math.copysign(1.0, speed) * faster / driver_angle.TURN
-    # the bearing of the channel, else the first
-    bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
-    bearing = bearings[0]
+    bearing = _bearing_of(manifest, quantity)
     at, what = bearing.path, _FREQUENCIES[place]
     frequency = float(getattr(frequencies_of(bearing, values), what))
-    if what == "shaft":
-        of = bearing.ring_speed
-    elif what == "ball_pass_inner":
+    if what == "ball_pass_inner":
         of = f"{at}.inner_pass_speed"
     elif what != "cage" and f"{at}.outer_pass_speed" in values:  # of an outer ring that turns
         of = f"{at}.outer_pass_speed"
