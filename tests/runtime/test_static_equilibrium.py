@@ -211,3 +211,17 @@ def test_one_line_says_what_it_is_and_print_shows_every_ball(press: Model) -> No
     assert "\n" not in repr(small)
     assert f"{small.natural_frequencies[0]:.6g}" in repr(small)
     assert "0.00∠" not in str(small)
+
+
+@pytest.mark.long
+def test_angles_of_an_engine_count_over_both_turns_of_its_cycle(make_model: Callable[..., Model]) -> None:
+    """400 degrees are not 40: the gas presses in one of two turns only."""
+    model = make_model("engine")
+    speed = model.parameters["mechanism.driver.speed"]
+    for degrees in (40.0, 400.0, -320.0):
+        angle = math.radians(degrees)
+        rest = model.static_equilibrium(crank_angle=angle)
+        assert rest.time == pytest.approx(angle % (4.0 * math.pi) / speed, rel=1e-9)
+        assert rest.load == pytest.approx(model.static_equilibrium(t=rest.time).load, rel=1e-9)
+    turns = [model.static_equilibrium(crank_angle=math.radians(degrees)).peak_ball_force for degrees in (40.0, 400.0)]
+    assert turns[0] > 1.3 * turns[1]

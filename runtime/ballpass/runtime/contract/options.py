@@ -238,7 +238,7 @@ Instant = Annotated[
 CrankAngle = Annotated[
     float | None,
     Option(
-        words="The instant as an angle of crank or shaft in the first turn.",
+        words="The instant as an angle of crank or shaft in the first turn, or cycle of turns.",
         example='"240 deg"',
         shown="ANGLE",
         unit="rad",

@@ -199,7 +199,7 @@ class StaticEquilibrium(Reported):
 
 
 def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: float | None) -> float:
-    """Time of an instant given by itself [s] or by the crank's angle [rad], in the first turn; 0 by default.
+    """Time of an instant given by itself [s] or by the crank's angle [rad], in the first cycle of turns; 0 by default.
 
     Raises
     ------
@@ -234,7 +234,7 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         if abs(math.remainder(past, driver_angle.TURN)) < driver_angle.ANGLE_RESOLUTION:
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
-    return (past % driver_angle.TURN) / abs(speed)
+    return (past % (driver_angle.TURN * driver_angle.cycle_turns(model.manifest, numbers.values))) / abs(speed)
 
 
 def held_coordinates(model: LoadedModel) -> Array:

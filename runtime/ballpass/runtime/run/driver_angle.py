@@ -52,6 +52,13 @@ def speed_name(manifest: Manifest) -> str | None:
     return None if manifest.bearing is None else manifest.bearing.ring_speed
 
 
+def cycle_turns(manifest: Manifest, values: Values) -> int:
+    """Turns of a driver after which all tables over its angle repeat: two for a four-stroke engine."""
+    speed = shaft_speed(manifest, values)
+    rates = [values[item.rate] for item in manifest.inputs if item.kind == "table" and item.rate]
+    return math.lcm(1, *(round(abs(speed / rate)) for rate in rates if rate != 0.0))
+
+
 def set_moving(manifest: Manifest, values: Values) -> dict[str, float]:
     """The first speed of a table that starts at rest, replaced by its fastest: which bearings turn then shows."""
     for item in manifest.inputs:
