@@ -168,6 +168,20 @@ def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Mod
 
 
 @pytest.mark.long
+def test_values_at_angles_of_an_engine_are_those_of_the_same_stroke(make_model: Callable[..., Model]) -> None:
+    """Whatever the last turn of the run: 40 degrees are not 400."""
+    model = make_model("engine")
+    turn = model.period()
+    for cycles in (4, 5):
+        found = values(model, ["value:inner.y@40deg", "value:inner.y@400deg"], cycles=cycles, transient=0)
+        run = model.simulate(cycles, rtol=1e-10, times=[turn * (k + 40.0 / 360.0) for k in (2, 3)])
+        late = model.simulate(cycles, rtol=1e-10, times=[turn * (4 + 40.0 / 360.0)]) if cycles == 5 else run
+        assert found["value:inner.y@400deg"] == pytest.approx(float(run["inner.y"][1]), rel=1e-4)
+        assert found["value:inner.y@40deg"] == pytest.approx(float(late["inner.y"][0]), rel=1e-4)
+        assert abs(run["inner.y"][0] / run["inner.y"][1] - 1.0) > 0.1
+
+
+@pytest.mark.long
 def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> None:
     """Parseval: mean square about the mean is half the sum of squares of the harmonics' amplitudes."""
     model = make_model("four_bar")

@@ -55,6 +55,9 @@ def named_place(quantity: Quantity) -> Moment:
 def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantity) -> tuple[float, Moment]:
     """Time at which a quantity with a place is taken, in the last turn before the end [s], and the moment.
 
+    Where tables over the driver's angle repeat after several turns the last so many count: 40 deg of a four-stroke
+    engine are not 400 deg.
+
     Raises
     ------
     RequestError
@@ -74,10 +77,11 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
     start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    turns = (start + speed * end - angle) / driver_angle.TURN
-    # the last turn before the end, an angle at the very end included; 1e-9 of a turn is rounding
-    whole = math.floor(turns + 1e-9) if speed > 0.0 else math.ceil(turns - 1e-9)
-    time = (angle + driver_angle.TURN * whole - start) / speed
+    cycle = driver_angle.TURN * driver_angle.cycle_turns(manifest, numbers.values)
+    cycles = (start + speed * end - angle) / cycle
+    # the last one before the end, an angle at the very end included; 1e-9 of it is rounding
+    whole = math.floor(cycles + 1e-9) if speed > 0.0 else math.ceil(cycles - 1e-9)
+    time = (angle + cycle * whole - start) / speed
     if time < 0.0:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
     return min(time, end), asked
