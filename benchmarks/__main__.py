@@ -35,7 +35,9 @@ def parts(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
 
 def state() -> dict[str, str]:
     """Commit, date and machine; no paths, no names of machines."""
-    commit = _said("git", "describe", "--always", "--dirty", "--abbrev=12") or "unknown"
+    commit = _said("git", "describe", "--always", "--abbrev=12") or "unknown"
+    if _said("git", "status", "--porcelain", ".", ":!benchmarks/results", ":!docs"):  # these a part writes itself
+        commit += "-dirty"
     compiler = find_compiler()
     facts = (
         _processor(),
