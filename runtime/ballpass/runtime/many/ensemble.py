@@ -220,14 +220,8 @@ def simulate_many(
     threads: int | None,
     lanes: bool,
     progress: Callable[[float], None] | None,
-    bounded: bool = True,
 ) -> EnsembleResult:
-    """Run an ensemble; see `ballpass.runtime.Model.simulate_many`.
-
-    Parameters
-    ----------
-    bounded : hold the numbers to their bounds
-    """
+    """Run an ensemble; see `ballpass.runtime.Model.simulate_many`."""
     started = clocks.perf_counter()
     manifest = model.manifest
     chosen = _quantities(model, observables)
@@ -248,7 +242,7 @@ def simulate_many(
     driver = model.ensemble_driver if model.states else None
     if driver is not None and at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)
-    members = make_members(model, columns, bounded=bounded)
+    members = make_members(model, columns)
     skipped = model.run_settings.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = driver is not None and lanes and at_kinks != LOCATED
