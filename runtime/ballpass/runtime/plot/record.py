@@ -5,7 +5,6 @@ In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its tu
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
@@ -94,22 +94,18 @@ class Record:
         values = self.solution.parameters
         return float(values[name]) if name in values else float(self.solution.constants[name])
 
+    @property
+    def _values(self) -> dict[str, float]:
+        return {**self.solution.parameters, **self.solution.constants}
+
     def table_turns(self, label: str) -> int:
         """Turns of the driver after which the table of a load repeats, named as ``force.gas``."""
-        kind, _, name = label.partition(".")
-        for number in range(1, len(self.solution.parameters)):
-            knot, part = f"mechanism.{kind}s.{name}.table.angle.{number}", f"{label}.part_angle_{number}"
-            if knot not in self.solution.parameters or part not in self.solution.constants:
-                break
-            if self.solution.constants[part] != 0.0:  # an angle in parts of what the table spans
-                return round(self.parameter(knot) / self.parameter(part))
-        return 1
+        return driver_angle.table_turns(self._values, label)
 
     @property
     def cycle_turns(self) -> int:
         """Turns after which all loads repeat: two for a four-stroke engine."""
-        labels = dict.fromkeys(name.rpartition(".")[0] for name in self.solution.constants if ".part_angle_" in name)
-        return math.lcm(1, *map(self.table_turns, labels))
+        return driver_angle.cycle_turns(self._values)
 
     def last_turns(self, count: int) -> slice:
         """The last whole turns, at most `count`; the whole record where it holds none."""

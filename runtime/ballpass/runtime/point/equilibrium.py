@@ -234,7 +234,7 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         if abs(math.remainder(past, driver_angle.TURN)) < driver_angle.ANGLE_RESOLUTION:
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
-    return (past % (driver_angle.TURN * driver_angle.cycle_turns(model.manifest, numbers.values))) / abs(speed)
+    return (past % (driver_angle.TURN * driver_angle.cycle_turns(numbers.values))) / abs(speed)
 
 
 def held_coordinates(model: LoadedModel) -> Array:

@@ -77,7 +77,7 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
     start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    cycle = driver_angle.TURN * driver_angle.cycle_turns(manifest, numbers.values)
+    cycle = driver_angle.TURN * driver_angle.cycle_turns(numbers.values)
     cycles = (start + speed * end - angle) / cycle
     # the last one before the end, an angle at the very end included; 1e-9 of it is rounding
     whole = math.floor(cycles + 1e-9) if speed > 0.0 else math.ceil(cycles - 1e-9)

@@ -52,11 +52,22 @@ def speed_name(manifest: Manifest) -> str | None:
     return None if manifest.bearing is None else manifest.bearing.ring_speed
 
 
-def cycle_turns(manifest: Manifest, values: Values) -> int:
-    """Turns of a driver after which all tables over its angle repeat: two for a four-stroke engine."""
-    speed = shaft_speed(manifest, values)
-    rates = [values[item.rate] for item in manifest.inputs if item.kind == "table" and item.rate]
-    return math.lcm(1, *(round(abs(speed / rate)) for rate in rates if rate != 0.0))
+def table_turns(values: Values, label: str) -> int:
+    """Turns of the driver after which the table of a load repeats, named as ``force.gas``."""
+    kind, _, name = label.partition(".")
+    for number in range(1, len(values)):
+        knot, part = f"mechanism.{kind}s.{name}.table.angle.{number}", f"{label}.part_angle_{number}"
+        if knot not in values or part not in values:
+            break
+        if values[part] != 0.0:  # an angle in parts of what the table spans
+            return round(values[knot] / values[part])
+    return 1
+
+
+def cycle_turns(values: Values) -> int:
+    """Turns of the driver after which all loads repeat: two for a four-stroke engine."""
+    labels = dict.fromkeys(name.rpartition(".")[0] for name in values if ".part_angle_" in name)
+    return math.lcm(1, *(table_turns(values, label) for label in labels))
 
 
 def set_moving(manifest: Manifest, values: Values) -> dict[str, float]:
