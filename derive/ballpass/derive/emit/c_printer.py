@@ -91,8 +91,8 @@ def print_function(
         if not function.sparsity_out(k).is_dense():
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
     name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
-    lines = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
-    head = [*lines, *_unused(function)]
+    head = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
+    head += _unused(function)
     body: list[str] = []
     if lanes:
         body += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]

@@ -157,9 +157,7 @@ def check_assembly(
         a parameter without a value.
     """
     driven = linkage.poses[linkage.driven]
-    apart = (entry for motion in linkage.play.values() for entry in motion.position)
-    closed = {symbol.name: 0.0 for entry in apart for symbol in entry.free_symbols}
-    numbers = {**values, **closed}
+    numbers = {**values, **{str(symbol): 0.0 for symbol in linkage.positions}}
     faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers)
     if not faults and linkage.play:
         plays = {
