@@ -43,12 +43,13 @@ class CompiledKernel:
     ----------
     function : the CasADi function
     inputs, outputs : memory of each argument and result, by name
+    evaluate : the compiled code alone, from one memory to the other
     """
 
     def __init__(self, function: casadi.Function) -> None:
         self.function = function
         buffer: Any = function.buffer()
-        self._buffer, self._evaluate = buffer
+        self._buffer, self.evaluate = buffer  # the first owns the memory the second works on
         self.inputs: dict[str, Array] = {}
         self.outputs: dict[str, Array] = {}
         self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, Array] | None]] = {}
@@ -83,7 +84,7 @@ class CompiledKernel:
         for name, memory in self.inputs.items():
             if name in values:
                 memory[:] = values[name]
-        self._evaluate()
+        self.evaluate()
         if self._buffer.ret():
             raise EvaluationError(f"{self.function.name()} reported failure")
 

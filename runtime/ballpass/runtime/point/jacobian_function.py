@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.kernel import CompiledKernel
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import ARGUMENTS, JacobianDirections, Rows, directions_of, rows_of
@@ -102,19 +103,13 @@ class JacobianFunction:
         self._by_states = all(label in model.states for label in self.columns)
         function, entries = self._prepare(rows, directions)
         self._entries = entries
-        buffer: Any = function.buffer()
-        self._buffer, self.evaluate = buffer  # the first owns the memory the second works on
-        self._memory: dict[str, Array] = {}
-        for k, name in enumerate(function.name_in()):
-            memory = self._memory[name] = np.zeros(function.nnz_in(k))
-            if memory.size:
-                self._buffer.set_arg(k, memory.data)
-        result = np.zeros(max(function.nnz_out(0), 1))
-        self._buffer.set_res(0, result.data)
+        self._kernel = CompiledKernel(function)
+        self.evaluate = self._kernel.evaluate
+        (result,) = self._kernel.outputs.values()
         whole = len(entries) == len(result) and bool(np.all(entries == np.arange(len(entries))))
         self._result = None if whole else result
         self.values = result if whole else np.zeros(len(entries))
-        self.x = self._memory["x"]
+        self.x = self._kernel.inputs["x"]
         self._place(numbers, t, directions)
 
     def _prepare(self, rows: Rows, directions: JacobianDirections) -> tuple[casadi.Function, Whole]:
@@ -150,7 +145,7 @@ class JacobianFunction:
     def _place(self, numbers: Numbers, t: float, directions: JacobianDirections) -> None:
         """Write everything but the state."""
         values: dict[str, Any] = point(self._model, numbers, t, None)
-        for name, memory in self._memory.items():
+        for name, memory in self._kernel.inputs.items():
             if name == "x":
                 continue
             memory[:] = values[name] if name in ARGUMENTS else directions.of(name[1:]).reshape(-1, order="F")
