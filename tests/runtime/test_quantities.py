@@ -213,6 +213,23 @@ def test_the_frequency_of_a_cage_between_rings_moves_with_the_balls_whichever_ri
     assert [pair.check.verdict for pair in report.pairs] == [Verdict.VERIFIED]
 
 
+def test_the_frequency_of_a_cage_whose_slip_changes_is_that_of_its_mean_over_the_run(
+    make_model: Callable[..., Model],
+) -> None:
+    """It was that of the last slip; its derivative by slips, and by times from which they hold, was none."""
+    slip = '[bearing.cage]\nslip = { time = ["0 s", "0.03 s"], value = [0.0, 0.2] }\n\n[bearing.initial]'
+    model = make_model("rotor", ("[bearing.initial]", slip))
+    cage = 50.0 * model.constants()["bearing.cage_ratio"] * (1.0 - 0.2 * 0.03 / 0.04)  # from 0.02 s to 0.06 s
+    lines = {"cage": cage, "bpfo": 8 * cage, "bpfi": 8 * (50.0 - cage)}
+    names = [f"amplitude:inner.y@{line}" for line in lines]
+    given = [f"amplitude:inner.y@{frequency:.12f}Hz" for frequency in lines.values()]
+    moved = ["bearing.cage.slip.value.1", "bearing.cage.slip.value.2", "bearing.cage.slip.time.2", "shaft.speed"]
+    report = model.sensitivity([*names, *given], moved, cycles=3, transient=1)
+    found = {item.name: item.value for item in report.quantities}
+    assert [found[name] for name in names] == pytest.approx([found[name] for name in given], rel=1e-9, abs=0.0)
+    assert {pair.check.verdict for pair in report.pairs} == {Verdict.VERIFIED}
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

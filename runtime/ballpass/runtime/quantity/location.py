@@ -16,7 +16,7 @@ from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
-from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
 from ballpass.runtime.ratings.of_bearing import TURNS, contact_cosine
 from ballpass.runtime.run import driver_angle
@@ -159,6 +159,9 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
         return order * abs(speed) / driver_angle.TURN, order * math.copysign(1.0, speed) * faster / driver_angle.TURN
     bearing = _bearing_of(manifest, quantity)
     at, what = bearing.path, _FREQUENCIES[place]
+    lag_rate, lag_slope = _mean_lag_rate(view, bearing)
+    turning = (f"{at}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS))
+    values = {**values, **{name: values[name] - lag_rate for name in turning if name in values}}
     frequency = float(getattr(frequencies_of(bearing, values), what))
     if what == "ball_pass_inner":
         of = f"{at}.inner_pass_speed"
@@ -166,7 +169,8 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
         of = f"{at}.outer_pass_speed"
     else:
         of = f"{at}.cage_speed"
-    slope = frequency / values[of] * view.slopes(of) if values[of] else 0.0 * view.slopes(of)
+    moving = view.slopes(of) - lag_slope
+    slope = frequency / values[of] * moving if values[of] else 0.0 * moving
     if what == "ball_spin":  # in proportion to cos(contact angle) + pitch/ball
         ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
         ratio = values[pitch] / values[ball]
@@ -176,6 +180,21 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
             moved = moved + view.slopes(angled)
         slope = slope + frequency / (contact_cosine(bearing, values) + ratio) * moved
     return frequency, slope
+
+
+def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
+    """Mean rate at which a cage lags its speed in the end [rad/s], and its derivative; 0 where slip is constant."""
+    values, times = view.numbers.values, view.nodes.t
+    for item in view.manifest.inputs:
+        if item.name == f"{bearing.prefix}cage.lag_rate":
+            rows = np.searchsorted([values[name] for name in item.times], times, side="right")
+            slopes = np.zeros((len(times), view.directions))
+            for row in np.unique(rows).tolist():
+                here = rows == row
+                for _, name, amount in driver_angle.input_derivatives([item], values, float(times[here][0])):
+                    slopes[here] += amount * view.slopes(name)
+            return view.mean(driver_angle.inputs_over([item], values, times, times)[:, 0], slopes)
+    return 0.0, np.zeros(view.directions)
 
 
 def is_frequency(manifest: Manifest, place: str) -> bool:
