@@ -29,8 +29,8 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime import Model
 from ballpass.runtime.certify.differences import richardson
-from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folder import read_manifest
 
 DELTA, RATE, STIFFNESS, COEFFICIENT, WIDTH, RATE_WIDTH = sp.symbols("delta rate k c w w_v", real=True)
 

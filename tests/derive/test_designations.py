@@ -17,7 +17,7 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.designations import CatalogueRating, bearing_types
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime.app.commands.ranges import read_ranges
-from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.ratings import load_ratings, of_bearing
 
 TYPES = {name: kind for name, kind in bearing_types().items() if kind.element == "ball"}

@@ -13,7 +13,7 @@ import pytest
 from ballpass.derive import SceneError, check, generate
 from ballpass.derive.emit.signature import signature
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.folder import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 

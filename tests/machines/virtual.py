@@ -7,7 +7,7 @@ from pathlib import Path
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
-from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.folder import read_manifest
 
 
 def virtual_model(text: str, folder: Path) -> Model:

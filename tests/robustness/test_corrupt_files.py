@@ -22,8 +22,8 @@ from ballpass.derive.emit.generate import GENERATED
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.manifest import DIGEST, FILE_NAME, digest_of
 from ballpass.runtime.native import compile as compiling
 
@@ -106,7 +106,7 @@ def test_a_manifest_of_something_else_is_refused_with_a_remedy(
     rotor: Path, key: str, value: object, words: str
 ) -> None:
     """The digest is right: another version wrote it."""
-    from ballpass.runtime.contract import DIGEST, digest_of
+    from ballpass.runtime.contract.manifest import DIGEST, digest_of
 
     document = json.loads((rotor / "manifest.json").read_text(encoding="utf-8"))
     del document[DIGEST]

@@ -33,9 +33,10 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import CacheWarning, CompileError, RequestError, Status, load, load_solution
 from ballpass.runtime.app.commands import shared
 from ballpass.runtime.app.commands.shared import Stages, read_own
-from ballpass.runtime.contract import Manifest, read_artefact, read_manifest
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folder import read_artefact, read_manifest
 from ballpass.runtime.contract.folders import NEW, replace_files
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.native import compile as compiling
 from ballpass.runtime.native import compilers
 

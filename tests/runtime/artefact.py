@@ -14,7 +14,8 @@ from pathlib import Path
 
 import casadi as ca
 
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract import manifest as mf
+from ballpass.runtime.contract.folder import file_digest, write_manifest
 
 BALLS = 3
 DEFAULTS = {
@@ -121,7 +122,7 @@ def write_folder(
     for function in made:
         pack.pack(function)
     del pack
-    mf.write(folder, manifest(made, folder, defaults or {}, states, mechanism))
+    write_manifest(folder, manifest(made, folder, defaults or {}, states, mechanism))
     return folder
 
 
@@ -177,7 +178,7 @@ def manifest(
         run=mf.RunInfo(
             cycles=3.0, duration=None, transient_cycles=1.0, samples_per_cycle=200, method="auto", rtol=1e-8
         ),
-        files=tuple((name, mf.file_digest(folder / name)) for name in ("model.c", "model.casadi")),
+        files=tuple((name, file_digest(folder / name)) for name in ("model.c", "model.casadi")),
     )
     if not states:
         found = replace(found, states=(), coordinates=(), initial=())

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.run import driver_angle
 
 TURN = 2.0 * math.pi

@@ -25,8 +25,8 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import ArtefactError, IntegrationError, Model, RequestError, Solution, load
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.contract import ParameterInfo
 from ballpass.runtime.contract.bounds import allowed
+from ballpass.runtime.contract.manifest import ParameterInfo
 from ballpass.runtime.export.c_program import export_c
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import tight_below

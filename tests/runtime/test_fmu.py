@@ -29,7 +29,7 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.contract import read_artefact
+from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.export.fmu import export_fmu, input_names, platform_tuple
 from ballpass.runtime.export.model_description import base_powers
 from ballpass.runtime.run import driver_angle

@@ -12,8 +12,8 @@ from scipy.integrate import quad
 from ballpass.runtime import Model
 from ballpass.runtime.ask.life_report import _oscillation, life_report
 from ballpass.runtime.ask.wear import LoadSamples, wear_field
-from ballpass.runtime.contract import DutyInfo, LubricationInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import DutyInfo, LubricationInfo
 from ballpass.runtime.ratings import groove_slip, life
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of
 from ballpass.runtime.ratings.readings import READINGS

@@ -11,7 +11,7 @@ import pytest
 from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
-from ballpass.runtime.contract import LubricationInfo
+from ballpass.runtime.contract.manifest import LubricationInfo
 from ballpass.runtime.ratings import life, lubrication
 
 WORDS = '[bearing.lubrication]\noil_grade = "VG 68"\ntemperature_celsius = 70\ncleanliness = "normal cleanliness"\n'

@@ -11,15 +11,16 @@ from typing import Any
 import pytest
 from artefact import manifest as made_manifest
 
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folder import check_files, read_manifest, write_manifest
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "model.c").write_text("int x;\n")
     (tmp_path / "model.casadi").write_text("functions\n")
-    mf.write(tmp_path, made_manifest((), tmp_path, {}, True, True))
+    write_manifest(tmp_path, made_manifest((), tmp_path, {}, True, True))
     return tmp_path
 
 
@@ -29,9 +30,9 @@ def document(folder: Path) -> dict[str, Any]:
 
 def test_round_trip_gives_the_same_record_and_the_same_bytes(folder: Path) -> None:
     written = (folder / "manifest.json").read_bytes()
-    manifest = mf.read_manifest(folder)
+    manifest = read_manifest(folder)
     assert manifest == made_manifest((), folder, {}, True, True)
-    mf.write(folder, manifest)
+    write_manifest(folder, manifest)
     assert (folder / "manifest.json").read_bytes() == written
     assert [path.name for path in sorted(folder.iterdir())] == ["manifest.json", "model.c", "model.casadi"]
 
@@ -57,16 +58,16 @@ def test_a_fault_of_an_edit_that_is_meant_is_named(folder: Path, change: Any, wo
 
 def test_missing_folder_says_how_to_make_one(tmp_path: Path) -> None:
     with pytest.raises(ArtefactError, match="ballpass derive SCENE"):
-        mf.read_manifest(tmp_path / "nowhere")
+        read_manifest(tmp_path / "nowhere")
 
 
 def test_edited_and_missing_files_are_all_named(folder: Path) -> None:
-    manifest = mf.read_manifest(folder)
-    mf.check_files(folder, manifest)
+    manifest = read_manifest(folder)
+    check_files(folder, manifest)
     (folder / "model.c").write_text("int y;\n")
     (folder / "model.casadi").unlink()
     with pytest.raises(ArtefactError) as caught:
-        mf.check_files(folder, manifest)
+        check_files(folder, manifest)
     assert "model.c: sha256" in str(caught.value)
     assert "model.casadi: missing" in str(caught.value)
 

@@ -13,8 +13,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from ballpass.runtime.contract import BearingInfo, CatalogueInfo, DampingInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import BearingInfo, CatalogueInfo, DampingInfo
 from ballpass.runtime.ratings import ellipse, groove_slip, life, load_ratings, mounted_clearance
 from ballpass.runtime.ratings.of_bearing import ratings_of
 

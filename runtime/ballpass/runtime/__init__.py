@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.ask.peaks import Peak
     from ballpass.runtime.certify.quantity_function import QuantityFunction, UnknownValueWarning
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.contract import Manifest, read_manifest
     from ballpass.runtime.contract.errors import (
         ArtefactError,
         BallpassError,
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
         RequestError,
         SimulationError,
     )
+    from ballpass.runtime.contract.folder import read_manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.contract.parameters import Parameters
     from ballpass.runtime.contract.plausible_ranges import UnusualWarning
     from ballpass.runtime.contract.status import Status
@@ -102,8 +103,8 @@ _HOME = {
     "QuantityFunction": "certify.quantity_function",
     "UnknownValueWarning": "certify.quantity_function",
     "SensitivityReport": "certify.sensitivity_report",
-    "Manifest": "contract",
-    "read_manifest": "contract",
+    "Manifest": "contract.manifest",
+    "read_manifest": "contract.folder",
     "ArtefactError": "contract.errors",
     "BallpassError": "contract.errors",
     "BallpassWarning": "contract.errors",

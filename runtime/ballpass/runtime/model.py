@@ -13,9 +13,10 @@ from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
 from ballpass.runtime.certify.transient import find_transient
-from ballpass.runtime.contract import Manifest, RunInfo, read_artefact
 from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folder import read_artefact
+from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.ensemble_parts import simulate_parts

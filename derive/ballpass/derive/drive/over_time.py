@@ -12,7 +12,7 @@ from ballpass.derive.drive.angle_state import AngleState, driver_coordinate
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Input
-from ballpass.runtime.contract import DRIVER_ACCELERATION
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 
 
 def over_time(driver: Driver) -> AngleState:

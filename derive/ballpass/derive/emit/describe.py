@@ -23,7 +23,7 @@ from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.scene.records import FRAME
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract import manifest as mf
 
 
 def describe(

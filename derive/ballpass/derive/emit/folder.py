@@ -33,7 +33,7 @@ from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header,
 from ballpass.derive.lowering.functions import LoweredFunctions
 from ballpass.derive.lowering.jacobians import DERIVATIVES, Described
 from ballpass.derive.system import System
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract.folder import file_digest, write_manifest
 
 
 def write_folder(folder: Path, system: System, functions: LoweredFunctions, source: str) -> None:
@@ -49,8 +49,8 @@ def write_folder(folder: Path, system: System, functions: LoweredFunctions, sour
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
-    files = tuple((p.name, mf.file_digest(p)) for p in sorted(folder.iterdir()))
-    mf.write(folder, describe(system, functions, source, files))
+    files = tuple((p.name, file_digest(p)) for p in sorted(folder.iterdir()))
+    write_manifest(folder, describe(system, functions, source, files))
 
 
 def _headers(system: System, functions: LoweredFunctions) -> dict[str, str]:

@@ -25,8 +25,9 @@ from ballpass.derive.emit.signature import (
     signature,
     source_key,
 )
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.folder import file_digest, read_manifest, write_manifest
 from ballpass.runtime.contract.folders import locked, replace_files
 from ballpass.runtime.show.progress import shown
 
@@ -146,7 +147,7 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderChe
     folder = folder_of(scene, out)
     present: dict[str, str] = {}
     with contextlib.suppress(ArtefactError):
-        manifest = mf.read_manifest(folder)
+        manifest = read_manifest(folder)
         source, present = source or manifest.source, dict(manifest.files)
     present |= _digests(folder)
     system, functions = _derive_and_lower(read, lambda _: None)
@@ -179,7 +180,7 @@ def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System,
 def _digests(folder: Path) -> dict[str, str]:
     """Digests of the files in a folder by name."""
     paths = folder.glob("[!.]*") if folder.is_dir() else ()
-    return {path.name: mf.file_digest(path) for path in paths if path.is_file()}
+    return {path.name: file_digest(path) for path in paths if path.is_file()}
 
 
 def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> None:
@@ -210,7 +211,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
 
         derive(scene)  # refuses a linkage that locks with its new numbers
     with locked(folder):
-        mf.write(folder, updated)
+        write_manifest(folder, updated)
 
 
 def _refuse_foreign(folder: Path) -> None:
@@ -235,5 +236,5 @@ def _written(folder: Path) -> set[str]:
     """Names of the files in a folder that a derivation wrote, this version's or the one that left the manifest."""
     names = set(GENERATED)
     with contextlib.suppress(ArtefactError):
-        names |= {name for name, _ in mf.read_manifest(folder).files if Path(name).name == name}
+        names |= {name for name, _ in read_manifest(folder).files if Path(name).name == name}
     return {name for name in names if (folder / name).is_file() and not (folder / name).is_symlink()}

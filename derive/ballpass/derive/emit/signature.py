@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ballpass.derive.scene.file_columns import named_files
-from ballpass.runtime import contract as mf
+from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folder import check_files, read_manifest
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.version import __version__
 
@@ -80,8 +81,8 @@ def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> 
 def intact_manifest(folder: Path) -> mf.Manifest | None:
     """The folder's manifest where its digests fit the files."""
     try:
-        present = mf.read_manifest(folder)
-        mf.check_files(folder, present)
+        present = read_manifest(folder)
+        check_files(folder, present)
     except ArtefactError:
         return None
     return present

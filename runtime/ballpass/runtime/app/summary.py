@@ -23,9 +23,9 @@ import numpy as np
 from ballpass.runtime.app.summary_words import inside, row_place, row_words
 from ballpass.runtime.ask.observables import statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, has_quantities, refine_peaks, run_of
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__

@@ -16,7 +16,7 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import ReportTable
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
     from ballpass.runtime.quantity.values import QuantityValue
     from ballpass.runtime.run.accuracy import Accuracy

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.ratings.elements import RatedElement
 from ballpass.runtime.ratings.of_bearing import contacts_of, rated_element
 from ballpass.runtime.report.numbers import rounded

@@ -13,8 +13,8 @@ import numpy as np
 
 from ballpass.runtime.ask.kept_parts import Arrays, kept_parts
 from ballpass.runtime.ask.parameter_distribution import parameter_distribution
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.many.distributions import Distribution
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel

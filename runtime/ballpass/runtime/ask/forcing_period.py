@@ -16,8 +16,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from ballpass.runtime.ask.life_records import BearingStrength
-from ballpass.runtime.contract import BearingInfo
+from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.ratings.of_bearing import geometry_of, rated_element
 
 #: Largest equivalent load over C_r for which ISO 281 gives a life [1].

@@ -16,8 +16,8 @@ from ballpass.runtime.ask.life_limits import limits_of
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, RingStrength, StateStrength
 from ballpass.runtime.ask.life_text import LifeReport
 from ballpass.runtime.ask.wear import LoadSamples, load_samples, wear_field
-from ballpass.runtime.contract import BearingInfo, DutyInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import BearingInfo, DutyInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
 

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name

@@ -7,8 +7,8 @@ or ``...=norm:loc=10 um:scale=2 um``.  Out: a `Distribution`, SI.
 from __future__ import annotations
 
 from ballpass.runtime.ask.parameter_range import parameter_range
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.many.distributions import Distribution, plain_arguments

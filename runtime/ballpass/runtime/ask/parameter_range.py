@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import allowed as bounds_text
 from ballpass.runtime.contract.bounds import outside
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ballpass.runtime.certify.growth import Growth, by_moved_start
-from ballpass.runtime.contract import RunInfo
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.manifest import RunInfo
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import Request

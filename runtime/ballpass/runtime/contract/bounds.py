@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 
 #: Name of a bound, its words in messages, and the comparison that a value must satisfy.
 _BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (

@@ -82,7 +82,7 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     return Manifest.from_json(text, source=str(path), verify=verify)
 
 
-def write(folder: str | Path, manifest: Manifest) -> Path:
+def write_manifest(folder: str | Path, manifest: Manifest) -> Path:
     """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it."""
     target = Path(folder) / FILE_NAME
     replace_file(target, manifest.to_json().encode())

@@ -11,9 +11,9 @@ from numbers import Real
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest, ParameterInfo
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest, ParameterInfo
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 

@@ -17,8 +17,9 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ballpass.runtime.contract import Manifest, check_files, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.folder import check_files, read_artefact
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.scene_numbers import (
     STANDALONE,
     columns_of,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.export.scene_numbers import computed_outputs, outputs_function
 from ballpass.runtime.native.loaded_model import LoadedModel
 

@@ -26,8 +26,9 @@ from xml.etree import ElementTree as Xml
 import casadi
 import numpy as np
 
-from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folder import read_artefact
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs

@@ -14,7 +14,7 @@ from fractions import Fraction
 from itertools import chain
 from xml.etree import ElementTree as Xml
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION, InputInfo, Manifest, MarginInfo, VariableInfo
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, InputInfo, Manifest, MarginInfo, VariableInfo
 from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel

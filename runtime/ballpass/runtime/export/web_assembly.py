@@ -12,9 +12,9 @@ from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.c_program import program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind
 from ballpass.runtime.native.compilers import run_compiler

@@ -25,10 +25,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ballpass.runtime.contract import read_artefact
 from ballpass.runtime.contract.errors import CompileError, RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.folder import read_unchanged
+from ballpass.runtime.contract.folder import read_artefact, read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compile import compile_model

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked, refuse_full_disk
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure

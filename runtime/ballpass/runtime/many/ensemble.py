@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import BallpassError, RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.distributions import NOISE, Distribution, stream

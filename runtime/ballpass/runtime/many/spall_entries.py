@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle

@@ -31,10 +31,11 @@ from pathlib import Path
 
 import platformdirs
 
-from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
+from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 

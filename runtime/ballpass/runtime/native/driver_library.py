@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import (
     BYTES,

@@ -14,9 +14,10 @@ from typing import Any
 
 import casadi
 
-from ballpass.runtime.contract import MODEL, Manifest, read_unchanged
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import ArtefactError, CompileError, RequestError
+from ballpass.runtime.contract.folder import read_unchanged
+from ballpass.runtime.contract.manifest import MODEL, Manifest
 from ballpass.runtime.contract.options import Option, refuse_faults
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator

@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from ballpass.runtime.contract import Manifest, RunInfo
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
+from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import find_compiler, without_compiler

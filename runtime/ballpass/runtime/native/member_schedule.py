@@ -11,7 +11,7 @@ import ctypes
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.native.driver_library import DOUBLES, LONGS, address, declare
 
 #: Kinds of inputs in the order of schedule.h.

@@ -19,8 +19,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.manifest import BearingInfo
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.ratings.result_limits import FLATTENED, VOID, limit_words, passed_limit
 
 Array: TypeAlias = NDArray[np.float64]

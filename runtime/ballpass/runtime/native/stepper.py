@@ -12,7 +12,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import (

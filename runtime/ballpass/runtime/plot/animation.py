@@ -17,7 +17,7 @@ from ballpass.runtime.plot.record import FRAME, Array, Record
 from ballpass.runtime.plot.shapes import Points, coupler_points, exaggeration, guide_direction, links, used_points
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import MechanismInfo
+    from ballpass.runtime.contract.manifest import MechanismInfo
 
 #: Samples of a page, at most: a turn in steps of a third of a degree.
 FRAMES = 1000

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.observables import turns
-from ballpass.runtime.contract import force_components, table_direction
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import force_components, table_direction
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
@@ -23,7 +23,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import BearingInfo, InputInfo, Manifest, MechanismInfo
+    from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, MechanismInfo
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.run.solution import Solution
 

@@ -9,7 +9,7 @@ import numpy as np
 from ballpass.runtime.plot.record import FRAME, Array
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import MechanismInfo
+    from ballpass.runtime.contract.manifest import MechanismInfo
 
 #: Points of bodies: a place (2,), or places over time (times, 2) [m].
 Points = dict[tuple[str, str], Array]

@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from ballpass.runtime.contract import Manifest, ParameterInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest, ParameterInfo
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 

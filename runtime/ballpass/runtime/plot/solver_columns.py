@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ballpass.runtime.contract import BearingInfo, Manifest, force_components, table_direction
-from ballpass.runtime.contract.manifest import UsualInfo
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest, UsualInfo, force_components, table_direction
 from ballpass.runtime.contract.plausible_ranges import usual_template
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.export.scene_numbers import columns_of

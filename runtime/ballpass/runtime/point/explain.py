@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import BallpassError
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS

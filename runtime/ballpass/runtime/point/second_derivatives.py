@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.native.loaded_model import LoadedModel

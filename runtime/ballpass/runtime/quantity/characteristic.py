@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import BearingInfo, Manifest
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.run import driver_angle

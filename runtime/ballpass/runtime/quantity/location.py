@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of

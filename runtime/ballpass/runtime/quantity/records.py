@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, ReductionRows, reduction_rows

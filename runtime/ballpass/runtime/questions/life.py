@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.life_records import BearingStrength
     from ballpass.runtime.ask.life_text import LifeReport
-    from ballpass.runtime.contract import BearingInfo
+    from ballpass.runtime.contract.manifest import BearingInfo
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.point.run_start import Initial
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 
 Reader = Callable[[Manifest | None, str, Sequence[str]], None]

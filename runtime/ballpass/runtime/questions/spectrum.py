@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.vibration import DiagnosisStatistics
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.quantity.characteristic import CharacteristicLine, LineName
     from ballpass.runtime.run.solution import Solution
 

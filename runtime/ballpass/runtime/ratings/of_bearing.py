@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ballpass.runtime.contract import BearingInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.ratings.branches import cosine
 from ballpass.runtime.ratings.elements import RATED, ElementGeometry, RacewayContact, RatedElement
 from ballpass.runtime.ratings.life import ElementLife

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION, InputInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, InputInfo, Manifest
 
 TURN = 2.0 * math.pi
 

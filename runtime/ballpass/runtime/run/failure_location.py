@@ -16,7 +16,7 @@ from ballpass.runtime.run.magnitudes import mass_matrix
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ballpass.runtime.contract import CoordinateInfo
+    from ballpass.runtime.contract.manifest import CoordinateInfo
     from ballpass.runtime.contract.parameters import Numbers
     from ballpass.runtime.native.loaded_model import LoadedModel
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, TURNED, reduction_rows

@@ -14,7 +14,7 @@ from ballpass.runtime.native.driver_library import SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.native.stepper import Stepper
 
 Kinks = Literal["stepped-over", "located"]

@@ -36,7 +36,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.member_schedule import MOMENTS

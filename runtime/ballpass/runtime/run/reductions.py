@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract import BearingInfo, Manifest
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.reduction_rows import (
     BALL_CHANNELS,

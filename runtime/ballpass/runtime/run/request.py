@@ -20,7 +20,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.start import Start
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
 
 #: Longest run, in turns and in time [s].  A press takes days of computing for so many turns, and
 #: the angle of an edge within the last of them is exact to a thousandth of a turn.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle

@@ -13,7 +13,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
+from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.accuracy import Accuracy

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.run.netcdf import SEAL_LENGTH, seal
 from ballpass.runtime.run.reductions import Reductions

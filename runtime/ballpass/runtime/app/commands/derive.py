@@ -9,7 +9,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import command, complain, warn_of_scene
-from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.folder import read_manifest
 
 
 def derive(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.features import Cost
     from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.point.explain import Explanation
 
 #: Names of derivatives and of the values that they are taken of, which the table sums up.

@@ -13,7 +13,7 @@ from typing import Any
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
 #: What a scene file writes: a number, then its unit.

@@ -26,8 +26,9 @@ from ballpass.runtime.app.commands.shared import (
     read_own,
     warn_of_scene,
 )
-from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folder import read_artefact
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.model_description import SPEED
 
 

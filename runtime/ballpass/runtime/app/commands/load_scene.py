@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.units import split_setting
 from ballpass.runtime.plot import FORMATS
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.scene.errors import Fault
     from ballpass.derive.scene.records import RunSettings
-    from ballpass.runtime.contract import Manifest, RunInfo
+    from ballpass.runtime.contract.manifest import Manifest, RunInfo
 
 _Run = TypeVar("_Run", bound="RunSettings | RunInfo")
 

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.app.commands.load_scene import read_value, refuse_run_setting
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import Bounded, outside
 from ballpass.runtime.contract.bounds import allowed as bounds_text
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 
 if TYPE_CHECKING:

@@ -24,9 +24,9 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ballpass.runtime.app.interrupted import say_interrupted
-from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
+from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.text import WIDTH
@@ -34,7 +34,7 @@ from ballpass.runtime.report.text import show as show_report
 from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
 

@@ -34,14 +34,14 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.app.interrupted import say_interrupted
-from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
 from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract.manifest import Manifest
 
 Of = Annotated[
     Sequence[str] | None,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 from ballpass.runtime.run.driver_angle import TURN
 

@@ -12,7 +12,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract import BearingInfo, Manifest
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import LOAD_POWERS, POWERS, SECTORS, TURNED
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
