@@ -9,93 +9,54 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ballpass.runtime.app.results import Results, load_results
-    from ballpass.runtime.ask.peaks import Peak
-    from ballpass.runtime.certify.quantity_function import QuantityFunction, UnknownValueWarning
-    from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.contract.errors import (
-        ArtefactError,
-        BallpassError,
-        BallpassWarning,
-        CompileError,
-        RequestError,
-        SimulationError,
-    )
-    from ballpass.runtime.contract.folder import read_manifest
-    from ballpass.runtime.contract.manifest import Manifest
-    from ballpass.runtime.contract.parameters import Parameters
-    from ballpass.runtime.contract.plausible_ranges import UnusualWarning
-    from ballpass.runtime.contract.status import Status
-    from ballpass.runtime.many.chunks import MemberFailure
-    from ballpass.runtime.many.data_set import DataSetReport, SignalClass, make_data_set
-    from ballpass.runtime.many.distributions import Distribution
-    from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics
-    from ballpass.runtime.many.signals import Signals
-    from ballpass.runtime.model import Model, load
-    from ballpass.runtime.native.compile import CacheWarning, NoCompilerWarning
-    from ballpass.runtime.native.loaded_model import NoKernelsWarning
-    from ballpass.runtime.point.equilibrium import FreeRingWarning, StaticEquilibrium
-    from ballpass.runtime.point.explain import Explanation
-    from ballpass.runtime.point.jacobian_function import JacobianFunction
-    from ballpass.runtime.point.linearize import Linearization, Mode
-    from ballpass.runtime.point.slopes import KinkWarning
-    from ballpass.runtime.run.integration_error import IntegrationError
-    from ballpass.runtime.run.reductions import Reduction, Reductions
-    from ballpass.runtime.run.sensitivity import Sensitivities
-    from ballpass.runtime.run.sensor import Sensor
-    from ballpass.runtime.run.solution import Solution, Statistics
-    from ballpass.runtime.run.solution_file import load_solution
-    from ballpass.runtime.run.start import RunEnd
+    from ballpass.runtime.app.results import Results as Results
+    from ballpass.runtime.app.results import load_results as load_results
+    from ballpass.runtime.ask.peaks import Peak as Peak
+    from ballpass.runtime.certify.quantity_function import QuantityFunction as QuantityFunction
+    from ballpass.runtime.certify.quantity_function import UnknownValueWarning as UnknownValueWarning
+    from ballpass.runtime.certify.sensitivity_report import SensitivityReport as SensitivityReport
+    from ballpass.runtime.contract.errors import ArtefactError as ArtefactError
+    from ballpass.runtime.contract.errors import BallpassError as BallpassError
+    from ballpass.runtime.contract.errors import BallpassWarning as BallpassWarning
+    from ballpass.runtime.contract.errors import CompileError as CompileError
+    from ballpass.runtime.contract.errors import RequestError as RequestError
+    from ballpass.runtime.contract.errors import SimulationError as SimulationError
+    from ballpass.runtime.contract.folder import read_manifest as read_manifest
+    from ballpass.runtime.contract.manifest import Manifest as Manifest
+    from ballpass.runtime.contract.parameters import Parameters as Parameters
+    from ballpass.runtime.contract.plausible_ranges import UnusualWarning as UnusualWarning
+    from ballpass.runtime.contract.status import Status as Status
+    from ballpass.runtime.many.chunks import MemberFailure as MemberFailure
+    from ballpass.runtime.many.data_set import DataSetReport as DataSetReport
+    from ballpass.runtime.many.data_set import SignalClass as SignalClass
+    from ballpass.runtime.many.data_set import make_data_set as make_data_set
+    from ballpass.runtime.many.distributions import Distribution as Distribution
+    from ballpass.runtime.many.ensemble import EnsembleResult as EnsembleResult
+    from ballpass.runtime.many.ensemble import EnsembleStatistics as EnsembleStatistics
+    from ballpass.runtime.many.signals import Signals as Signals
+    from ballpass.runtime.model import Model as Model
+    from ballpass.runtime.model import load as load
+    from ballpass.runtime.native.compile import CacheWarning as CacheWarning
+    from ballpass.runtime.native.compile import NoCompilerWarning as NoCompilerWarning
+    from ballpass.runtime.native.loaded_model import NoKernelsWarning as NoKernelsWarning
+    from ballpass.runtime.point.equilibrium import FreeRingWarning as FreeRingWarning
+    from ballpass.runtime.point.equilibrium import StaticEquilibrium as StaticEquilibrium
+    from ballpass.runtime.point.explain import Explanation as Explanation
+    from ballpass.runtime.point.jacobian_function import JacobianFunction as JacobianFunction
+    from ballpass.runtime.point.linearize import Linearization as Linearization
+    from ballpass.runtime.point.linearize import Mode as Mode
+    from ballpass.runtime.point.slopes import KinkWarning as KinkWarning
+    from ballpass.runtime.run.integration_error import IntegrationError as IntegrationError
+    from ballpass.runtime.run.reductions import Reduction as Reduction
+    from ballpass.runtime.run.reductions import Reductions as Reductions
+    from ballpass.runtime.run.sensitivity import Sensitivities as Sensitivities
+    from ballpass.runtime.run.sensor import Sensor as Sensor
+    from ballpass.runtime.run.solution import Solution as Solution
+    from ballpass.runtime.run.solution import Statistics as Statistics
+    from ballpass.runtime.run.solution_file import load_solution as load_solution
+    from ballpass.runtime.run.start import RunEnd as RunEnd
 
-__all__ = [
-    "ArtefactError",
-    "BallpassError",
-    "BallpassWarning",
-    "CacheWarning",
-    "CompileError",
-    "DataSetReport",
-    "Distribution",
-    "EnsembleResult",
-    "EnsembleStatistics",
-    "Explanation",
-    "FreeRingWarning",
-    "IntegrationError",
-    "JacobianFunction",
-    "KinkWarning",
-    "Linearization",
-    "Manifest",
-    "MemberFailure",
-    "Mode",
-    "Model",
-    "NoCompilerWarning",
-    "NoKernelsWarning",
-    "Parameters",
-    "Peak",
-    "QuantityFunction",
-    "Reduction",
-    "Reductions",
-    "RequestError",
-    "Results",
-    "RunEnd",
-    "Sensitivities",
-    "SensitivityReport",
-    "Sensor",
-    "SignalClass",
-    "Signals",
-    "SimulationError",
-    "Solution",
-    "StaticEquilibrium",
-    "Statistics",
-    "Status",
-    "UnknownValueWarning",
-    "UnusualWarning",
-    "load",
-    "load_results",
-    "load_solution",
-    "make_data_set",
-    "read_manifest",
-]
-
+#: Public names, and the modules that have them.
 _HOME = {
     "Results": "app.results",
     "load_results": "app.results",
@@ -145,6 +106,7 @@ _HOME = {
     "load_solution": "run.solution_file",
     "RunEnd": "run.start",
 }
+__all__ = sorted(_HOME.keys() - {"__version__"})
 
 
 def __getattr__(name: str) -> Any:
@@ -156,4 +118,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    return sorted(_HOME)
