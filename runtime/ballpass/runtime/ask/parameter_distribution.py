@@ -29,7 +29,7 @@ def parameter_distribution(manifest: Manifest, option: str, text: str) -> tuple[
     path, _, written = (part.strip() for part in text.partition("="))
     name, *parts = (part.strip() for part in written.split(":"))
     if not parts or not all("=" in part for part in parts):
-        chosen = parameter_range(manifest, option, text)
+        chosen = parameter_range(manifest.parameters, option, text)
         low, high = sorted((chosen.low, chosen.high))
         if chosen.logarithmic:
             return path, Distribution(name="loguniform", arguments={"a": low, "b": high})

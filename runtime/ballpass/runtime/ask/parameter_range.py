@@ -1,11 +1,12 @@
 """A range of one parameter as questions take it: ``bearing.clearance=0um:40um``, or with a count behind it.
 
-In: a manifest and text.  Out: a `ParameterRange`, SI, within the parameter's bounds.
+In: parameters and text.  Out: a `ParameterRange`, SI, within the parameter's bounds.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.bounds import allowed as bounds_text
 from ballpass.runtime.contract.bounds import outside
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.manifest import ParameterInfo
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
@@ -21,7 +22,7 @@ from ballpass.runtime.contract.units import QuantityError, parse_quantity
 _NUMBER = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?")
 
 #: Most values of a range.
-MOST = 100_000
+MOST = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +48,17 @@ class ParameterRange:
     factor: float = 1.0
     logarithmic: bool = False
 
+    @property
+    def values(self) -> np.ndarray:
+        """All values, from one end to the other, shape (count,), SI."""
+        space = np.geomspace if self.logarithmic else np.linspace
+        return np.asarray(space(self.low, self.high, self.count), dtype=float)
+
+    @property
+    def shown(self) -> np.ndarray:
+        """The same in `shown_unit`."""
+        return self.values / self.factor
+
     def at(self, share: float) -> float:
         """The value that lies so far on the way from the first end to the second, SI."""
         if self.logarithmic:
@@ -67,34 +79,42 @@ class ParameterRange:
 
 
 def parameter_range(
-    manifest: Manifest, option: str, text: str, *, counted: bool = False, deviations: bool = False
+    parameters: Sequence[ParameterInfo],
+    option: str,
+    text: str,
+    *,
+    counted: bool = False,
+    deviations: bool = False,
+    parse: Callable[[object, str], float] = parse_quantity,
 ) -> ParameterRange:
     """Read a range.
 
     Parameters
     ----------
+    parameters : those that there are
     option : what the caller calls it, for messages
     counted : whether a count of values belongs to it
     deviations : whether it is of changes of the parameter, to which the parameter's bounds do not apply
+    parse : reads a text as a number of a unit
 
     Raises
     ------
     RequestError
         Another form, an unknown parameter, a wrong unit, or ends that are equal or out of bounds.
     """
-    shape = "PATH=A:B:N" if counted else "PATH=A:B" if deviations else "PATH=A:B or PATH=A:B:log"
-    example = 'bearing.clearance="5 um:40 um' + (':80"' if counted else '"')
+    form, example = ("PATH=A:B:N", '5 um:40 um:8"') if counted else ("PATH=A:B", '5 um:40 um"')
+    shape = form if deviations else f"{form} or {form}:log"
     path, equals, written = (part.strip() for part in text.partition("="))
     parts = [part.strip() for part in written.split(":")]
-    logarithmic = not (counted or deviations) and parts[2:] == ["log"]
-    if not equals or len(parts) != (3 if counted or logarithmic else 2):
-        raise RequestError(f"{option}: {text!r:.80} is no range. Allowed: {shape}, as in {example}.")
-    infos = {info.name: info for info in manifest.parameters}
+    logarithmic = not deviations and parts[-1] == "log"
+    if not equals or len(parts) - logarithmic != form.count(":") + 1:
+        raise RequestError(f'{option}: {text!r:.80} is no range. Allowed: {shape}, as in bearing.clearance="{example}.')
+    infos = {info.name: info for info in parameters}
     if path not in infos:
         raise RequestError(f"{option}: {unknown_name('parameter', path, infos)}")
     info = infos[path]
     try:
-        low, high = (parse_quantity(end, info.unit) for end in parts[:2])
+        low, high = (parse(end, info.unit) for end in parts[:2])
     except QuantityError as error:
         raise RequestError(f"{option} {path}: {error}") from None
     if low == high:
@@ -119,6 +139,6 @@ def parameter_range(
         high=high,
         count=count,
         shown_unit=shown,
-        factor=parse_quantity(f"1 {shown}", info.unit) if shown != "1" else 1.0,
+        factor=parse(f"1 {shown}", info.unit) if shown != "1" else 1.0,
         logarithmic=logarithmic,
     )

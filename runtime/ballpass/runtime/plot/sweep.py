@@ -7,7 +7,6 @@ carry numbers, so that it survives a greyscale print.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
+from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, label, log_ticks, new_figure, styled
 
@@ -30,33 +30,9 @@ CONTOURS = 7
 FLAT = 1e-12
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VariedAxis:
-    """A varied parameter of a figure.
-
-    Attributes
-    ----------
-    path : of the parameter
-    words : description
-    unit : of the values
-    values : increasing or decreasing, shape (points,) [`unit`]
-    logarithmic : whether they are spaced so; they are above zero then
-    """
-
-    path: str
-    words: str
-    unit: str
-    values: np.ndarray
-    logarithmic: bool
-
-    @property
-    def label(self) -> str:
-        return label(self.words, self.unit)
-
-
 @styled
 def draw_sweep(
-    title: str, axes: Sequence[VariedAxis], quantity: str, words: str, unit: str, values: np.ndarray, text: str
+    title: str, axes: Sequence[ParameterRange], quantity: str, words: str, unit: str, values: np.ndarray, text: str
 ) -> Figure:
     """Figure of one quantity.
 
@@ -88,20 +64,20 @@ def draw_sweep(
         figure.colorbar(mesh, ax=panel, label=label(words, unit), format=StrMethodFormatter("{x:g}"))
     missing = int(np.count_nonzero(~np.isfinite(values)))
     lost = f" Crosses mark {missing} of {values.size} without a result." if missing else ""
-    varied = " and ".join(one.path for one in axes)
+    varied = " and ".join(one.name for one in axes)
     caption(figure, f"{title}: {quantity}", f"{values.size} parameter sets over {varied}. {text}{lost}")
     return figure
 
 
-def _line(panel: Axes, varied: VariedAxis, values: np.ndarray) -> None:
-    panel.plot(varied.values, values, color=INK, marker="o", markersize=4, linewidth=1.4)
+def _line(panel: Axes, varied: ParameterRange, values: np.ndarray) -> None:
+    panel.plot(varied.shown, values, color=INK, marker="o", markersize=4, linewidth=1.4)
     missing = ~np.isfinite(values)
-    places = varied.values[missing]
+    places = varied.shown[missing]
     panel.plot(places, np.full(places.size, 0.02), "x", transform=panel.get_xaxis_transform(), color=SIGNAL)
     _scale(panel, "x", varied)
 
 
-def _map(panel: Axes, first: VariedAxis, second: VariedAxis, values: np.ndarray) -> Any:
+def _map(panel: Axes, first: ParameterRange, second: ParameterRange, values: np.ndarray) -> Any:
     """The first parameter along x, the second along y."""
     shown = np.ma.masked_invalid(values.T)
     mesh = panel.pcolormesh(_edges(first), _edges(second), shown, cmap=LUMINANCE, rasterized=True)
@@ -109,11 +85,11 @@ def _map(panel: Axes, first: VariedAxis, second: VariedAxis, values: np.ndarray)
     if high - low > FLAT * max(abs(low), abs(high)) and min(shown.shape) > 1:
         levels = [level for level in MaxNLocator(CONTOURS).tick_values(low, high) if low < level < high]
         halo: list[AbstractPathEffect] = [withStroke(linewidth=2.4, foreground=PALE)]
-        lines = panel.contour(first.values, second.values, shown, levels=levels, colors="black", linewidths=0.8)
+        lines = panel.contour(first.shown, second.shown, shown, levels=levels, colors="black", linewidths=0.8)
         lines.set_path_effects(halo)
         for label in panel.clabel(lines, fmt="%g", fontsize=8):
             label.set_path_effects(halo)
-    across, up = np.meshgrid(first.values, second.values)
+    across, up = np.meshgrid(first.shown, second.shown)
     missing = np.ma.getmaskarray(shown)
     panel.plot(across[missing], up[missing], linestyle="none", marker="x", color=GREY)
     panel.grid(visible=False)
@@ -122,16 +98,16 @@ def _map(panel: Axes, first: VariedAxis, second: VariedAxis, values: np.ndarray)
     return mesh
 
 
-def _edges(varied: VariedAxis) -> np.ndarray:
+def _edges(varied: ParameterRange) -> np.ndarray:
     """Borders of the cells around the values, shape (points + 1,)."""
-    centres = np.log(varied.values) if varied.logarithmic else varied.values
+    centres = np.log(varied.shown) if varied.logarithmic else varied.shown
     middle = 0.5 * (centres[1:] + centres[:-1])
     edges = np.concatenate([[2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]])
     return np.exp(edges) if varied.logarithmic else edges
 
 
-def _scale(panel: Axes, axis: str, varied: VariedAxis) -> None:
-    panel.set(**{f"{axis}label": varied.label})
+def _scale(panel: Axes, axis: str, varied: ParameterRange) -> None:
+    panel.set(**{f"{axis}label": label(varied.words, varied.shown_unit)})
     if not varied.logarithmic:
         return
     panel.set(**{f"{axis}scale": "log"})

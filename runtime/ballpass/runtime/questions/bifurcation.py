@@ -40,7 +40,7 @@ MOMENTS = 40
 Vary = Annotated[
     str,
     Option(
-        words="Parameter and its values.",
+        words="Parameter and its values; `:log` behind them for equal factors.",
         shown="PATH=A:B:N",
         example='bearing.clearance="5 um:40 um:80"',
         names=option_names.ranges(counted=True),
@@ -221,10 +221,9 @@ def bifurcation(
     refuse_free_driver(manifest, "bifurcation")
     if exponent:
         refuse_jumps(manifest, "bifurcation with an exponent")
-    chosen = parameter_range(manifest, "vary", vary, counted=True)
+    chosen = parameter_range(manifest.parameters, "vary", vary, counted=True)
     names = [info.name for info in manifest.states]
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    values = np.linspace(chosen.low, chosen.high, chosen.count)
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
     step_of, every, forced = _strobe(model, {**overrides, chosen.name: chosen.low})
@@ -240,11 +239,11 @@ def bifurcation(
                 start = motion.states[-1]
                 done[0] += 1
                 if tell is not None:
-                    tell(done[0] / (2 * len(values)))
+                    tell(done[0] / (2 * chosen.count))
             return tuple(found)
 
         with ThreadPoolExecutor(2) as pool:
-            up, down = pool.map(sweep, (values, values[::-1]))
+            up, down = pool.map(sweep, (chosen.values, chosen.values[::-1]))
     scale = np.max(np.abs(np.concatenate([motion.states for motion in up])), axis=0) + 1e-300
     apart = tuple(
         one.value

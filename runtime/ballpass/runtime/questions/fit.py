@@ -167,7 +167,7 @@ def fit(
 
     refuse_jumps(model.manifest, "fit")
     texts = [vary] if isinstance(vary, str) else list(vary)
-    ranges = [parameter_range(model.manifest, "vary", text) for text in texts]
+    ranges = [parameter_range(model.manifest.parameters, "vary", text) for text in texts]
     sources = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
     columns = read_columns(signal)
     tolerance = FIT_RTOL if rtol is None else rtol

@@ -285,8 +285,10 @@ def optimize(
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
 
-    ranges = tuple(parameter_range(model.manifest, "vary", text) for text in _texts(vary))
-    box = tuple(parameter_range(model.manifest, "tolerance", text, deviations=True) for text in _texts(tolerance))
+    ranges = tuple(parameter_range(model.manifest.parameters, "vary", text) for text in _texts(vary))
+    box = tuple(
+        parameter_range(model.manifest.parameters, "tolerance", text, deviations=True) for text in _texts(tolerance)
+    )
     if len(box) > MOST_TOLERANCES:
         raise RequestError(
             f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."

@@ -52,7 +52,7 @@ def ranges(*, counted: bool = False, deviations: bool = False) -> Reader:
 
         if manifest is not None:
             for text in texts:
-                parameter_range(manifest, option, text, counted=counted, deviations=deviations)
+                parameter_range(manifest.parameters, option, text, counted=counted, deviations=deviations)
 
     return read
 

@@ -289,7 +289,7 @@ def steady(
     manifest = model.manifest
     refuse_free_driver(manifest, "steady")
     _ = model.stepper  # refused here where a scene has none
-    ends = None if over is None else parameter_range(manifest, "over", over)
+    ends = None if over is None else parameter_range(manifest.parameters, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)
     turn = model.period(given)

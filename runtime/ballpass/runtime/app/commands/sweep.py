@@ -139,7 +139,7 @@ def sweep(
         folder = results_folder(out, scene)
         figures, formats = figures and can_draw(), read_formats(format_)
         varied = grid(ranges)
-        count = math.prod(len(one.values) for one in ranges)
+        count = math.prod(one.count for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
         with connected(scheduler, workers) as client:
             model = load_model(

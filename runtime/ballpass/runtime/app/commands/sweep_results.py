@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.app.commands.ranges import Range
+from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.units import printed_unit, table_unit
@@ -46,13 +46,18 @@ class Sweep:
     """
 
     result: EnsembleResult
-    ranges: Sequence[Range]
+    ranges: Sequence[ParameterRange]
     fixed: Mapping[str, float]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Points of each range."""
-        return tuple(len(one.values) for one in self.ranges)
+        return tuple(one.count for one in self.ranges)
+
+    @cached_property
+    def _values(self) -> list[np.ndarray]:
+        """Values of each range [SI]."""
+        return [one.values for one in self.ranges]
 
     @cached_property
     def _attributes(self) -> dict[str, dict[str, str]]:
@@ -61,11 +66,11 @@ class Sweep:
     def grid(self) -> bytes:
         """Write a NetCDF-4 file with a dimension for each varied parameter; ``status`` says how each member ended."""
         facts = self._attributes
-        paths = tuple(one.path for one in self.ranges)
+        paths = tuple(one.name for one in self.ranges)
         status = np.full(math.prod(self.shape), "DONE", dtype=object)
         for failure in self.result.failures:
             status[failure.member] = failure.status
-        variables: dict[str, Variable] = {one.path: ((one.path,), one.values, facts[one.path]) for one in self.ranges}
+        variables: dict[str, Variable] = {one.name: ((one.name,), one.values, facts[one.name]) for one in self.ranges}
         variables |= {path: ((), np.array(value), facts[path]) for path, value in self.fixed.items()}
         for name, values in self.result.observables.items():
             variables[name] = (paths, values.reshape(self.shape), facts[name])
@@ -87,12 +92,12 @@ class Sweep:
     def point(self, member: int) -> list[float]:
         """Values of a member's varied parameters [SI]."""
         indices = np.unravel_index(member, self.shape)
-        return [float(one.values[k]) for one, k in zip(self.ranges, indices, strict=True)]
+        return [float(values[k]) for values, k in zip(self._values, indices, strict=True)]
 
     def place(self, member: int) -> str:
         """Parameters of a member, in words and the units of the request."""
         return ", ".join(
-            f"{one.path} = {value / one.factor:.6g} {printed_unit(one.shown_unit)}".removesuffix(" 1")
+            f"{one.name} = {value / one.factor:.6g} {printed_unit(one.shown_unit)}".removesuffix(" 1")
             for one, value in zip(self.ranges, self.point(member), strict=True)
         )
 
@@ -108,14 +113,14 @@ class Sweep:
     def report(self) -> dict[str, Any]:
         """The request and its results, in SI; members in the order of the table."""
         result = self.result
-        paths = [one.path for one in self.ranges]
+        paths = [one.name for one in self.ranges]
         return {
             "scene": result.manifest.scene,
             "title": result.manifest.title,
             "members": math.prod(self.shape),
             "varied": [
                 {
-                    "path": one.path,
+                    "path": one.name,
                     "unit": one.unit,
                     "spacing": "logarithmic" if one.logarithmic else "linear",
                     "values": one.values.tolist(),
@@ -162,7 +167,7 @@ class Sweep:
     def _write_table(self, path: Path) -> None:
         """A line for each member, SI; no number where a member has no result."""
         quantities = self.result.observables
-        parameters = [f"{one.path} [{one.unit}]" for one in self.ranges]
+        parameters = [f"{one.name} [{one.unit}]" for one in self.ranges]
         heads = ["member", *parameters, *(f"{name} [{self.unit(name)}]" for name in quantities), "status", "message"]
         ends = {member: ("DONE", f"no digits: {', '.join(names)}") for member, names in self.uncertain.items()}
         ends |= {failure.member: (failure.status, failure.message) for failure in self.result.failures}
@@ -175,24 +180,20 @@ class Sweep:
                 lines.writerow([member, *map(repr, self.point(member)), *cells, *ends.get(member, ("DONE", ""))])
 
     def _figures(self) -> Iterator[tuple[str, Figure]]:
-        from ballpass.runtime.plot.sweep import VariedAxis, draw_sweep
+        from ballpass.runtime.plot.sweep import draw_sweep
 
-        axes = [
-            VariedAxis(
-                path=one.path,
-                words=self._attributes[one.path]["long_name"],
-                unit=one.shown_unit,
-                values=one.shown,
-                logarithmic=one.logarithmic,
-            )
-            for one in self.ranges
-        ]
         text = f"rtol {self.result.statistics.rtol:g}."
         for name in self.result.observables:
             values, unit = self.shown(name)
             if np.any(np.isfinite(values)):
                 figure = draw_sweep(
-                    self.result.manifest.title, axes, name, self._attributes[name]["long_name"], unit, values, text
+                    self.result.manifest.title,
+                    self.ranges,
+                    name,
+                    self._attributes[name]["long_name"],
+                    unit,
+                    values,
+                    text,
                 )
                 yield f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}", figure
 
@@ -205,7 +206,7 @@ class Sweep:
     def all_members(self) -> ReportTable:
         """All members, each a row."""
         columns = {name: self.shown(name) for name in self.result.observables}
-        heads = [_head(one.path, printed_unit(one.shown_unit)) for one in self.ranges]
+        heads = [_head(one.name, printed_unit(one.shown_unit)) for one in self.ranges]
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
         rows = []
         for member in range(math.prod(self.shape)):
