@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Annulus, Circle
 from matplotlib.text import Annotation, Text
 
 from ballpass.runtime import Model, Solution
@@ -24,6 +24,7 @@ from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot import CAPTIONS, NAMES
 from ballpass.runtime.plot.animation import choose_frames, to_plain
+from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
@@ -211,6 +212,31 @@ def test_a_share_of_the_reaction_is_not_drawn_as_the_load_where_the_scene_gives_
         assert (load is not None) is drawn
         if load is not None:
             assert load[0, 0] > 4.5e3
+
+
+def test_the_load_of_an_outer_ring_that_moves_is_what_the_balls_push_back(make_virtual: Callable[..., Model]) -> None:
+    """Two-way the joint's reaction is that of the housing, which moves the outer ring: up to 8 % of the load apart."""
+    outputs = ('"ball.*", "reaction.*"', '"ball.*", "ring_force.*", "reaction.*"')
+    model = make_virtual("punching_press_two_way", outputs)
+    record = gather(model, model.simulate(cycles=0.8, transient=0.7))
+    load, push, reaction = (
+        np.column_stack([record.values(f"{name}.{axis}") for axis in "xy"]) if name else record.ring_load()
+        for name in ("", "ring_force", "reaction.A")
+    )
+    assert load == pytest.approx(push, rel=1e-9, abs=1e-6)
+    assert np.max(np.hypot(*(np.abs(push) - np.abs(reaction)).T)) > 100.0
+
+
+def test_an_axially_preloaded_bearing_is_drawn_with_the_gap_that_is_left(make_virtual: Callable[..., Model]) -> None:
+    """Its clearance was drawn, of which an axial displacement leaves a preload."""
+    model = make_virtual("rotor", ("[bearing.damping]", 'axial_displacement = "0.08 mm"\n\n[bearing.damping]'))
+    record = gather(model, model.simulate(cycles=0.1, transient=0))
+    assert record.radial_gap == record.solution.constants["bearing.radial_gap"] < -1e-6
+    figure = Figure()
+    draw_bearing(figure.subplots(), record, 0)
+    outer = next(patch for patch in figure.axes[0].patches if isinstance(patch, Annulus))
+    touched = 0.5 * (record.parameter("bearing.pitch_diameter") + record.parameter("bearing.ball_diameter"))
+    assert outer.get_radii()[0] - outer.get_width() < touched
 
 
 def test_load_curve_shows_reaction_and_half_of_it_over_one_turn(press: Run) -> None:

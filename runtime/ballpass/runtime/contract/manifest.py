@@ -275,6 +275,11 @@ class BearingInfo:
     inner_stands: bool = False
     alignment: AlignmentInfo | None = None
 
+    @property
+    def moves_linkage(self) -> bool:
+        """Whether bearing and linkage move each other: coupled two-way."""
+        return self.ring_speed.startswith(f"{self.path}.")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismInfo:

@@ -103,7 +103,7 @@ class SolutionPlot:
 
         Parameters
         ----------
-        relative : to an elastic outer ring, which loads the balls; a circle shows half the clearance
+        relative : to an elastic outer ring, which loads the balls; a circle shows the radial gap
 
         Raises
         ------

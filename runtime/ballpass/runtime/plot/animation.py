@@ -279,7 +279,7 @@ def _springs(record: Record, samples: np.ndarray, shown: list[tuple[str, str]], 
 def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
     bearing = record.bearing
     assert bearing is not None  # of those only
-    clearance, ball = record.parameter("bearing.clearance"), record.parameter("bearing.ball_diameter")
+    gap, ball = record.radial_gap, record.parameter("bearing.ball_diameter")
     inner, outer = record.centres("inner")[samples], record.centres("outer")[samples]
     moved = inner - outer
     first = np.array([record.ball_angles(int(k))[0] for k in samples])
@@ -293,8 +293,8 @@ def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
         "balls": bearing.balls,
         "pitch": record.parameter("bearing.pitch_diameter"),
         "ball": ball,
-        "clearance": clearance,
-        "factor": exaggeration(0.25 * ball, max(abs(clearance) / 2.0, furthest)),
+        "gap": gap,
+        "factor": exaggeration(0.25 * ball, max(abs(gap), furthest)),
         "ball_angle": _signal(_from_first_turn(np.degrees(first)), ANGLE),
         "force": _columns(force[samples]),
         "inner": _columns(1e6 * moved),

@@ -38,13 +38,12 @@ def draw_bearing(axes: Axes, record: Record, sample: int, samples: Sequence[int]
     """
     pitch = record.parameter("bearing.pitch_diameter")
     ball = record.parameter("bearing.ball_diameter")
-    clearance = record.parameter("bearing.clearance")
     _, forces = record.ball_force()
     shown = list(samples) or [sample]
     force, offsets = forces[sample], record.centres("inner") - record.centres("outer")
     offset, furthest = offsets[sample], float(np.max(np.hypot(*offsets[shown].T)))
-    factor = exaggeration(0.25 * ball, max(abs(clearance) / 2.0, furthest))
-    inner, outer, gap = factor * offset, np.zeros(2), factor * clearance / 4.0
+    factor = exaggeration(0.25 * ball, max(abs(record.radial_gap), furthest))
+    inner, outer, gap = factor * offset, np.zeros(2), factor * record.radial_gap / 2.0
 
     wall = 0.42 * ball
     inner_raceway, outer_raceway = (pitch - ball) / 2.0 - gap, (pitch + ball) / 2.0 + gap

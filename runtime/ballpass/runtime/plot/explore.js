@@ -98,7 +98,7 @@ function resultsOf(run) {
     rest(`${id}rms_ball_force`, `Rms of the force on the most loaded ${numbers.bearings[k].noun}${of}`, "N", rms(run, force));
     const life = bearing.life ? lifeOf(run, bearing) : 0;
     if (life) found.push({ key: `${id}life`, words: `Rating life${of}, 90 % of such bearings run longer`, unit: "h", value: life, digits: 3, short: `life${of}` });
-    if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing.load, row)))));
+    if (bearing.load) rest(`${id}rms_load`, `Rms of the load on the ring${of}`, "N", rms(run, peak(`${id}peak_load`, `Highest load on the ring${of}`, "N", (row) => length(loadOf(run, bearing, row)))));
     peak(`${id}peak_motion`, `Furthest that the rings are apart${of}`, "\u00b5m", (row) => length(motionOf(bearing, row)));
     shortly(`rings apart${of}`);
     const parts = [0, 1].map((axis) => measured(run, (row) => motionOf(bearing, row)[axis])), middle = parts.map((part) => mean(run, part));
@@ -158,7 +158,7 @@ function drawOrbit(bearing, number) {
   const section = element(get("charts"), "section", "", { class: "orbit" });
   element(section, "h2", "Orbit of the inner ring against the outer [\u00b5m]");
   const picture = draw(section, "svg", { viewBox: "-60 -60 120 120", role: "img", "aria-label": "orbit of the inner ring" });
-  const orbits = [bearing, before((run) => run.bearings[number])].filter(Boolean).map(({ inner }) => inner.map(all)), limit = 1e6 * bearing.clearance / 2;
+  const orbits = [bearing, before((run) => run.bearings[number])].filter(Boolean).map(({ inner }) => inner.map(all)), limit = 1e6 * bearing.gap;
   const unit = 50 / highest(orbits.map(([xs, ys]) => highest(xs.map((x, k) => length([x, ys[k]])))).concat(Math.abs(limit)));
   const [now, old] = orbits.map(([xs, ys]) => traced(xs.map((x) => unit * x), ys.map((y) => -unit * y)));
   for (const [x, y] of [[1, 0], [0, 1]]) draw(picture, "line", { x1: -56 * x, x2: 56 * x, y1: -56 * y, y2: 56 * y, stroke: "var(--grid)", "stroke-width": 0.5 });
@@ -167,7 +167,7 @@ function drawOrbit(bearing, number) {
   draw(picture, "polyline", { points: now, fill: "none", stroke: "var(--ink)", "stroke-width": 0.8, "stroke-linejoin": "round" });
   const dot = draw(picture, "circle", { r: 1.8, fill: "var(--signal)" });
   for (const value of ticks(0, 56 / unit).slice(1)) draw(picture, "text", { x: value * unit, y: 4.5, "font-size": 4, "text-anchor": "middle" }, value);
-  element(section, "p", `${limit > 0 ? "dashed circle: half the clearance; " : ""}equal scales${compared ? "; dotted: the scene's numbers" : ""}`);
+  element(section, "p", `${limit > 0 ? "dashed circle: gap between the rings; " : ""}equal scales${compared ? "; dotted: the scene's numbers" : ""}`);
   return (k) => set(dot, { cx: at(bearing.inner[0], k) * unit, cy: -at(bearing.inner[1], k) * unit });
 }
 

@@ -66,8 +66,7 @@ def orbit(record: Record) -> Figure:
     if both:
         for axes, title in zip(panels, ("in the frame's axes", "relative to the outer ring"), strict=True):
             axes.set_title(title)
-        text += f" The second path is what the {record.noun}s feel; dotted: half the diametral clearance around the "
-        text += "outer ring."
+        text += f" The second path is what the {record.noun}s feel; dotted: the radial gap."
     if record.cycle_length is not None and record.turns:
         path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
         text += f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
@@ -110,7 +109,7 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
         words = f"not to one scale: the path is\n{wide:.3g} µm wide and {high:.3g} µm high"
         axes.text(0.98, 0.98, words, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=GREY)
     if relative:
-        around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 5e5 * record.parameter("bearing.clearance")
+        around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 1e6 * record.radial_gap
         if radius > 0.0:
             axes.plot(radius * np.cos(around), radius * np.sin(around), color=GREY, linestyle=(0, (1, 1.5)), zorder=1)
     against = " against the outer one" if relative else "'s centre"

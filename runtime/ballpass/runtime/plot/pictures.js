@@ -195,7 +195,7 @@ function drawBearing(bearing) {
   const picture = get("rings").querySelector("svg"), ink = { stroke: "var(--ink)", "stroke-width": 0.4 };
   picture.replaceChildren();
   const unit = 41 / (0.5 * bearing.pitch + 0.92 * bearing.ball), r = 0.5 * bearing.ball * unit, wall = 0.84 * r;
-  const gap = bearing.factor * bearing.clearance / 4 * unit, inside = 0.5 * bearing.pitch * unit - r - gap, outside = inside + 2 * (r + gap);
+  const gap = bearing.factor * bearing.gap / 2 * unit, inside = 0.5 * bearing.pitch * unit - r - gap, outside = inside + 2 * (r + gap);
   const most = highest(bearing.force.flatMap(all));
   draw(picture, "circle", { r: outside + wall, fill: "var(--ring)", ...ink });
   draw(picture, "circle", { r: outside, fill: "var(--panel)", ...ink });

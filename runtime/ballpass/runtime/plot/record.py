@@ -18,9 +18,9 @@ from ballpass.runtime.contract.manifest import force_components, table_direction
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
-from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap, rated_element
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.ball_angles import ball_angles
+from ballpass.runtime.run.ball_angles import ball_angles, ball_angles_along
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, MechanismInfo
@@ -198,6 +198,12 @@ class Record:
         return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
 
     @property
+    def radial_gap(self) -> float:
+        """Approach of the rings at which a ball is in contact [m]: half the clearance, or what axial preload leaves."""
+        assert self.bearing is not None  # of those only
+        return radial_gap(self.bearing, self._values)
+
+    @property
     def loaded_by_joint(self) -> bool:
         """Whether the bearing's load is its share of a joint's reaction alone: the scene gives none beside it."""
         given = any(name.startswith(("load.", "loads.")) for name in self.solution.parameters)
@@ -210,6 +216,9 @@ class Record:
         bearing = self.bearing
         if bearing is None or not self.loaded_by_joint:
             return None
+        # two-way the reaction is that of the housing, which moves an outer ring of its own as well
+        if bearing.moves_linkage and bearing.outer_ring:
+            return self._force_on_balls() if self.has("ball.force") else None
         names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
         if not self.has(*names):
             return None
@@ -218,6 +227,16 @@ class Record:
         # first
         share = self.bearing_share() * (-1.0 if first == bearing.inner_body else 1.0)
         return share * np.column_stack([self.values(name) for name in names])
+
+    def _force_on_balls(self) -> Array:
+        """Force of the inner ring on the balls, Eqs. (8) and (9), (n, 2) [N]."""
+        bearing = self.bearing
+        assert bearing is not None  # of those only
+        numbers = self.model.numbers(self.solution.parameters)
+        states = np.column_stack([self.solution[name] for name in self.solution.states])
+        angles = ball_angles_along(self.model, numbers, self.t, states)[self.manifest.bearings.index(bearing)]
+        radial = contact_cosine(bearing, self._values) * self.values("ball.force")
+        return np.column_stack([np.sum(radial * part(angles), axis=1) for part in (np.cos, np.sin)])
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
         """Applied forces that act at a time: name, (body, point), components (2,) [N]."""

@@ -194,7 +194,11 @@ function forceOf(run, source, row, placeOf) {
   return [size * Math.cos(direction), size * Math.sin(direction)];
 }
 
-function loadOf(run, load, row) {
+function loadOf(run, { load, force, cage, cosine }, row) {
+  if (load.columns === null) { // what presses the balls
+    const radial = cosine === null ? 1 : run.known[cosine], pitch = TURN / force.length;
+    return [Math.cos, Math.sin].map((part) => force.reduce((sum, column, ball) => sum + radial * row[column] * part(row[cagesAt + cage] + ball * pitch), 0));
+  }
   const share = load.sign * (load.share === null ? 1 : run.known[load.share]) / (load.count === null ? 1 : run.known[load.count]);
   return load.columns.map((column) => share * row[column]);
 }
@@ -267,11 +271,12 @@ function drawnOf(run) {
       }) };
   }
   fresh.bearings = solver.bearings.map((bearing, k) => {
-    const [moved, ball, clearance] = [rows.map((one) => motionOf(bearing, one)), run.known[bearing.ball], run.known[bearing.clearance]];
+    const [moved, ball] = [rows.map((one) => motionOf(bearing, one)), run.known[bearing.ball]];
+    const gap = bearing.gap === null ? run.known[bearing.clearance] / 2 : run.known[bearing.gap];
     const first = rows.map((one) => one[cagesAt + bearing.cage] / DEGREE), whole = 360 * Math.floor(Math.min(...first) / 360 + 1e-9);
-    const furthest = Math.max(Math.abs(clearance) / 2, 1e-6 * highest(moved.map(length)), 1e-12), share = 0.25 * ball / furthest, decade = 10 ** Math.floor(Math.log10(share));
-    const ends = bearing.load && rows.map((one) => loadOf(run, bearing.load, one));
-    return { ...numbers.bearings[k], pitch: run.known[bearing.pitch], ball, clearance,
+    const furthest = Math.max(Math.abs(gap), 1e-6 * highest(moved.map(length)), 1e-12), share = 0.25 * ball / furthest, decade = 10 ** Math.floor(Math.log10(share));
+    const ends = bearing.load && rows.map((one) => loadOf(run, bearing, one));
+    return { ...numbers.bearings[k], pitch: run.known[bearing.pitch], ball, gap,
       factor: Math.max(1, decade * Math.max(...[1, 2, 5].filter((digit) => digit * decade <= share))),
       ball_angle: { decimals: 3, all: first.map((angle) => angle - whole) },
       force: signalsOf(bearing.force.map((column) => rows.map((one) => one[column]))),

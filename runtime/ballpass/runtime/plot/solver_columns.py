@@ -139,6 +139,8 @@ def _bearing(
     load: dict[str, Any] | None = None
     if pair(own("load")) is not None:
         load = {"columns": pair(own("load")), "sign": 1, "share": None, "count": None}
+    elif record.loaded_by_joint and bearing.moves_linkage and bearing.outer_ring:  # as `Record.ring_load`
+        load = {"columns": None} if force.endswith("ball.force") else None
     elif record.loaded_by_joint and pair(f"reaction.{bearing.joint}") is not None:
         first = next(item[2] for item in record.mechanism.joints if item[0] == bearing.joint)
         load = {

@@ -41,8 +41,7 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
     for bearing in manifest.bearings:
         ring = values.get(f"{bearing.path}.m_ei", values.get(f"{bearing.path}.inner_ring.mass", 0.0))
-        two_way = bearing.ring_speed.startswith(f"{bearing.path}.")
-        if bearing.joint and not two_way and linkage > ring:
+        if bearing.joint and not bearing.moves_linkage and linkage > ring:
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
                 f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "

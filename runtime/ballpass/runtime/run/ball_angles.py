@@ -17,18 +17,30 @@ def ball_angles(model: LoadedModel, numbers: Numbers, time: float, state: np.nda
     time : [s]
     state : positions and velocities then, shape (states,)
     """
+    return [found[0] for found in ball_angles_along(model, numbers, np.array([time]), state[None, :])]
+
+
+def ball_angles_along(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> list[np.ndarray]:
+    """The same at many times, each of shape (times, balls).
+
+    Parameters
+    ----------
+    times : [s]
+    states : positions and velocities then, shape (times, states)
+    """
     if not model.manifest.bearings:
         return []
     given = {
-        "t": 0.0,  # since the reference time of the inputs' phases, which is `time` itself
-        "x": state,
-        "u": driver_angle.inputs_at(model.manifest.inputs, numbers.values, time),
+        "t": np.zeros((1, len(times))),  # since the reference times of the inputs' phases, which are `times` themselves
+        "x": states.T,
+        "u": driver_angle.inputs_over(model.manifest.inputs, numbers.values, times, times).T,
         "p": numbers.p,
         "c": numbers.c,
     }
     signature = model.manifest.function("cages").inputs
-    first = np.asarray(model.function("cages")(*(given[name] for name, _ in signature)), dtype=float).ravel()
+    # a column for each time
+    found = np.asarray(model.function("cages")(*(given[name] for name, _ in signature)), dtype=float)
     return [
-        angle + driver_angle.TURN * np.arange(bearing.balls) / bearing.balls
-        for bearing, angle in zip(model.manifest.bearings, first.tolist(), strict=True)
+        first[:, None] + driver_angle.TURN * np.arange(bearing.balls) / bearing.balls
+        for bearing, first in zip(model.manifest.bearings, found, strict=True)
     ]
