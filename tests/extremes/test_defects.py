@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.point.assembly import NearlyLockedWarning
+from ballpass.runtime.point.conditioning import ConditioningWarning
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.failure_location import locate_failure
 from ballpass.runtime.run.limits import brief_limit, step_limit
@@ -156,9 +158,21 @@ def test_phases_stay_small_within_a_segment(make_model: ModelMaker, scene_text: 
     assert np.max(np.diff(edges)) * 2.0 * math.pi * 1e6 <= LARGEST_PHASE * (1.0 + 1e-12)
 
 
-def test_a_linkage_that_nearly_locks_is_warned_about(make_model: ModelMaker) -> None:
+def test_the_summary_tells_how_well_the_reactions_can_be_solved(make_model: ModelMaker) -> None:
     model = make_model("punching_press")
+    summary = summarize(model, model.simulate(cycles=1, transient=0))
+    told = summary["reaction_condition"]
+    assert told["unscaled"] == pytest.approx(37.0458, rel=1e-5)  # of the printed 8 by 8 matrix at 180 degrees
+    assert told["unscaled"] > told["scaled"] > 1.0
+    assert set(told["crank_angle"]) == {"unscaled", "scaled", "unit"}
+    assert render_summary(summary, model.manifest)[0].rows
+
+
+def test_a_linkage_that_nearly_locks_is_warned_about(make_model: ModelMaker) -> None:
+    model = needs_stepper(make_model("punching_press"))
     near = {"mechanism.bodies.crank.points.B": 0.1 * (1.0 - 1e-9), "mechanism.driver.start_angle": math.radians(30.0)}
-    # the crank is as long as the rod, which lies across the guide there
-    with pytest.warns(NearlyLockedWarning, match=r"joint 'C', most at crank angle (180|0|360)\.00 deg.*margin 2e-09"):
-        model.check_assembly(near)
+    solution = model.simulate(cycles=0.1, parameters=near, transient=0)
+    with pytest.warns(
+        ConditioningWarning, match=r"ill-conditioned at crank angle (180|0|360)\.00 deg.*Change the lengths"
+    ):
+        summarize(model, solution)

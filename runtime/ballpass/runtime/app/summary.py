@@ -29,6 +29,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__
+from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.quantity.grammar import quantities_of
@@ -69,9 +70,9 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     -------
     mapping with words (``scene``, ``status``, ``method``, ``versions`` ...) and objects with numbers and their
     ``unit``, as far as the scene has them and their outputs were asked for: of the run (``steps``, ``wall_time`` ...);
-    extremes of reactions, loads and ``drive_torque``; ``drive_work`` a turn; ``peak_ball_force`` with time and ball;
-    extremes and means of the rings' motions; derived constants; kinematic ``frequencies``.  The page of outputs lists
-    them all.
+    extremes of reactions, loads and ``drive_torque``; ``drive_work`` a turn; ``reaction_condition``, the largest
+    condition number of the matrix of Eq. (1) in a turn; ``peak_ball_force`` with time and ball; extremes and means of
+    the rings' motions; derived constants; kinematic ``frequencies``.  The page of outputs lists them all.
 
     Raises
     ------
@@ -101,6 +102,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
         summary["steady_cycles"] = _numbers("steady_cycles", "1", value=turns_run)
     peaks = _peaks(model, steady)
     summary |= _forces(model, steady, peaks)
+    summary |= _conditioning(model, steady)
     summary |= _balls(manifest, peaks)
     summary |= _paths(steady)
     summary |= _motions(steady)
@@ -278,6 +280,16 @@ def _drive_work(model: Model, sol: Solution) -> float:
     assert sol.manifest.mechanism is not None  # it has a torque
     angle = math.copysign(TURN, sol.parameters[sol.manifest.mechanism.speed])
     return angle * statistics(sol.t, sol["drive_torque"]).mean
+
+
+def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
+    """Condition numbers of Eq. (1) over a turn; warns where they pass a bound."""
+    if not has_reactions(model):
+        return {}
+    found = conditioning(model, model.numbers(sol.parameters))
+    angles = {"unscaled": found.unscaled_angle, "scaled": found.scaled_angle, "unit": "rad"}
+    conditions = {"unscaled": found.unscaled, "scaled": found.scaled, "unit": "1", "crank_angle": angles}
+    return {"reaction_condition": conditions}
 
 
 def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:

@@ -24,6 +24,8 @@ _ADDED = {
     "peak_ball_force.total": "Highest ball force",
     "peak_ball_force.elastic": "Highest ball force, elastic part",
     "drive_work": "Work of the drive in a turn",
+    "reaction_condition.unscaled": "Condition number of the joint forces' equations",
+    "reaction_condition.scaled": "The same, with equations and forces scaled",
     "frequencies.shaft": "Shaft frequency",
     "frequencies.cage": "Cage frequency (FTF)",
     "frequencies.ball_pass_outer": "Ball pass, outer (BPFO)",

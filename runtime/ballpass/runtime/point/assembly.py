@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.contract.errors import BallpassWarning, RequestError
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
 
@@ -22,13 +21,6 @@ ANGLES = 720
 #: Sweeps around the smallest sample, each so many times finer than the one before.
 SWEEPS, FINE = 3, 128
 
-#: Margin below which a linkage nearly locks: forces grow with its inverse root, ten thousandfold [1].
-NEARLY_LOCKED = 1e-8
-
-
-class NearlyLockedWarning(BallpassWarning):
-    """A linkage passes a position where it nearly locks: errors of lengths and masses grow in its forces."""
-
 
 def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     """Check every margin of the linkage over a turn.
@@ -38,11 +30,6 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     RequestError
         A dyad cannot be assembled; names its joint and the crank angle at which it is worst.  A body with a bearing
         turns too fast for its angle to be followed.
-
-    Warns
-    -----
-    NearlyLockedWarning
-        A margin falls below `NEARLY_LOCKED`.
     """
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
@@ -56,22 +43,14 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
         time, worst = float(times[k]), float(margins[k, row])
         if worst > 0.0 and len(times) > 1:
             time, worst = _refine(model, numbers, row, time, turn / ANGLES)
-        if worst > NEARLY_LOCKED:
-            continue
-        if mechanism.angle:
-            angle = math.degrees(numbers.values[mechanism.start_angle] + time) % 360.0
-        else:
-            angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, time))
-        place = f"at crank angle {angle:.2f} deg ({info.description}: margin {worst:.4g})."
         if worst <= 0.0:
-            faults.append(f"The linkage cannot be assembled at joint {info.joint!r}, worst {place}")
-        else:
-            warnings.warn(
-                f"The linkage nearly locks at joint {info.joint!r}, most {place} Errors of lengths and masses grow "
-                "there in the forces. Change the lengths of the bodies that meet at the joint, or keep the driver away "
-                "from this angle.",
-                NearlyLockedWarning,
-                stacklevel=3,
+            if mechanism.angle:
+                angle = math.degrees(numbers.values[mechanism.start_angle] + time) % 360.0
+            else:
+                angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, time))
+            faults.append(
+                f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {angle:.2f} deg "
+                f"({info.description}: margin {worst:.4g})."
             )
     if faults:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")

@@ -1,0 +1,133 @@
+"""Condition numbers of the reaction matrix A(q) of Eq. (1), A r = b, over a turn.
+
+In: a model with a mechanism and its numbers.  Out: `Conditioning`: the largest condition number in a turn, of the
+matrix as it stands (SI, with forces beside moments) and of the matrix with rows and columns scaled to like size, with
+the crank angles where they are met.  The second one grows near a position where the linkage locks: reactions grow like
+it there, and so does the effect of errors of lengths and masses on them.
+
+Scaling: rows and columns are divided by the roots of their largest entries, in turns (D. Ruiz, A scaling algorithm to
+equilibrate both rows and columns norms in matrices, RAL-TR-2001-034).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import BallpassWarning
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import driver_angle
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract.parameters import Numbers
+
+#: Name of the generated function with A.
+FUNCTION = "reaction_system"
+
+#: Angles evaluated in a turn; around the largest value the maximum is refined.
+ANGLES = 360
+
+#: Sweeps around the largest sample, each so many times finer than the one before.
+SWEEPS, FINE = 3, 16
+
+#: Scaled condition number above which a warning is given [1].
+BOUND = 1e4
+
+#: Passes of the scaling; each halves the logarithm of the remaining imbalance.
+PASSES = 12
+
+
+class ConditioningWarning(BallpassWarning):
+    """The reactions of a linkage near a position where it locks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditioning:
+    """Largest condition numbers of A(q) in a turn, in the 2-norm.
+
+    Attributes
+    ----------
+    unscaled, scaled : of the matrix in SI, and with rows and columns of like size [1]
+    unscaled_angle, scaled_angle : crank angles where they are met, in [0, 2 pi) [rad]
+    """
+
+    unscaled: float
+    scaled: float
+    unscaled_angle: float
+    scaled_angle: float
+
+
+def has_reactions(model: LoadedModel) -> bool:
+    """Whether the model has a mechanism, and so the matrix."""
+    return model.manifest.mechanism is not None and model.has(FUNCTION)
+
+
+def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
+    """Condition numbers over a turn; where nothing turns, at the given position.
+
+    Warns
+    -----
+    ConditioningWarning
+        The scaled condition number passes `BOUND`; names the crank angle.
+    """
+    mechanism = model.manifest.mechanism
+    by_angle = mechanism is not None and mechanism.angle != ""
+    turn = driver_angle.TURN if by_angle else driver_angle.period(model.manifest, numbers.values)
+    kernel = model.kernel(FUNCTION)
+    span = turn if math.isfinite(turn) else 0.0
+
+    def matrix(t: float) -> np.ndarray:
+        """At a time, or at an angle past the start angle."""
+        if by_angle:
+            (x,) = driver_angle.turned_states(model.manifest, numbers.values, np.array([t]))
+            u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)
+            return np.asarray(kernel({"t": 0.0, "x": x, "u": u, "p": numbers.p, "c": numbers.c}))
+        u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t)
+        return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
+
+    times = span * np.arange(ANGLES) / ANGLES if span else np.zeros(1)
+    matrices = np.array([matrix(float(t)) for t in times])
+    found = []
+    for condition in (_condition, lambda m: _condition(equilibrate(m))):
+        values = condition(matrices)
+        k = int(np.argmax(values))
+        time, largest = float(times[k]), float(values[k])
+        if span and math.isfinite(largest):
+            reach = span / ANGLES
+            for _ in range(SWEEPS):
+                near = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+                values = condition(np.array([matrix(float(t)) for t in near]))
+                k = int(np.argmax(values))
+                time, largest, reach = float(near[k]), float(values[k]), reach / FINE
+        start = driver_angle.crank_angle(model.manifest, numbers.values, 0.0 if by_angle else time)
+        found.append((largest, (start + time) % driver_angle.TURN if by_angle else start))
+    (whole, whole_angle), (equal, equal_angle) = found
+    if not equal <= BOUND:
+        warnings.warn(
+            f"The reactions are ill-conditioned at crank angle {math.degrees(equal_angle):.2f} deg: condition number "
+            f"{equal:.3g} of the scaled matrix of Eq. (1), above {BOUND:.0e}. The linkage nearly locks there, and "
+            "errors of lengths and masses grow that much in the forces. Change the lengths of the bodies, or keep the "
+            "driver away from this angle.",
+            ConditioningWarning,
+            stacklevel=2,
+        )
+    return Conditioning(unscaled=whole, scaled=equal, unscaled_angle=whole_angle, scaled_angle=equal_angle)
+
+
+def equilibrate(matrix: np.ndarray) -> np.ndarray:
+    """Matrices with rows and columns scaled so that the largest entry of each is one in size; shape (..., n, n)."""
+    scaled = matrix.copy()
+    for _ in range(PASSES):
+        for axis in (-2, -1):
+            largest = np.max(np.abs(scaled), axis=axis, keepdims=True)
+            scaled = scaled / np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    return scaled
+
+
+def _condition(matrix: np.ndarray) -> np.ndarray:
+    finite = np.all(np.isfinite(matrix), axis=(-2, -1))
+    return np.where(finite, np.linalg.cond(np.where(finite[..., None, None], matrix, 0.0)), math.inf)
