@@ -19,7 +19,7 @@ from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.certify.jacobian_check import _quotient, checked_jacobian
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point import slopes
-from ballpass.runtime.point.jacobian import quantity_values
+from ballpass.runtime.point.jacobian import JacobianDirections, directions_of, output_tangents, quantity_values
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -157,6 +157,38 @@ def test_pattern_leaves_out_what_cannot_depend(press: Model) -> None:
     rhs = press.jacobian_function("rhs", "states").sparsity
     assert np.array_equal(rhs.rows[rhs.starts[4] : rhs.starts[5]][:1], [0])  # d(inner.x)/dt depends on inner.vx
     assert rhs.rows.size == 4 + 4 * 8
+
+
+def test_tangents_of_many_samples_are_the_matrix_along_each_direction(press: Model) -> None:
+    of, names = ["ball.force", "reaction.A.*", "rhs"], ["bearing.clearance", "mechanism.driver.speed", "inner.y"]
+    numbers, times = press.numbers(), np.array([0.0805, 0.0811, 0.0822])
+    states = np.array([loaded_state(press, t) for t in times])
+    moves: list[JacobianDirections] = [directions_of(press, numbers, names, t) for t in times]
+    found = output_tangents(
+        press,
+        numbers,
+        of,
+        t=np.zeros(3),
+        x=states,
+        u=np.array([press.inputs_at(t) for t in times]),
+        dx=np.array([m.x for m in moves]),
+        du=np.array([m.u for m in moves]),
+        dp=moves[0].p,
+        dc=moves[0].c,
+    )
+    for k, t in enumerate(times):
+        expected = press.jacobian(of, names, t=t, x=states[k])
+        assert found[k] == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.max(np.abs(expected)))
+
+
+def test_tangent_along_time_is_the_derivative_by_time(press: Model) -> None:
+    t = 0.0811
+    x = loaded_state(press, t)
+    found = output_tangents(
+        press, press.numbers(), "*", t=np.zeros(1), x=x[None], u=press.inputs_at(t), dt=np.ones((1, 1))
+    )
+    expected = press.jacobian("*", "time", t=t, x=x)
+    assert found[0, :, 0] == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.max(np.abs(expected)))
 
 
 def test_compiled_blocks_are_those_of_the_virtual_machine(press: Model) -> None:

@@ -8,7 +8,8 @@ stiffness), the phases and the tables as well.  Gates are flat: they jump at the
 derivative exists.  Derivatives along parameters are taken at fixed states.
 
 `contract` evaluates the sparse blocks of ``jacobians.c`` and contracts them with the directions (`slopes` does so on
-both sides of a corner); `jacobian_function` prepares one query for many states.
+both sides of a corner); `output_tangents` runs the generated derivative along a direction for many samples;
+`jacobian_function` prepares one query for many states.
 """
 
 from __future__ import annotations
@@ -247,3 +248,93 @@ def quantity_values(
 def values_of_rows(model: LoadedModel, parts: Sequence[Rows], there: Mapping[str, object]) -> Array:
     """Values of rows with the arguments `there`, shape (rows,)."""
     return np.concatenate([model.kernel(part.function)(there)[part.indices] for part in parts])
+
+
+def output_tangents(
+    model: LoadedModel,
+    numbers: Numbers,
+    of: str | Sequence[str],
+    *,
+    t: Array,
+    x: Array,
+    u: Array,
+    dx: Array | None = None,
+    du: Array | None = None,
+    dp: Array | None = None,
+    dc: Array | None = None,
+    dt: Array | None = None,
+) -> Array:
+    """Derivatives of quantities along M directions at N samples, through generated C; no Python loop over samples.
+
+    Parameters
+    ----------
+    of : names or patterns of quantities, or "rhs", as for `jacobian`; the rows of the result stand in that order, an
+        entry per ball one below the other (`rows_of` gives their labels)
+    t : times since the reference time of `u`, shape (N,) [s]
+    x : states, shape (N, states)
+    u : inputs at the reference time, shape (N, inputs), or (inputs,) for all samples
+    dx : how the states move, shape (N, states, M); None: not at all, likewise the others
+    du : how the inputs move, shape (N, inputs, M) or (inputs, M)
+    dp, dc : how parameters and constants move, shape (parameters, M) and (constants, M); see `directions_of`
+    dt : how the time since the reference moves, shape (N, M) or (M,) [s]
+
+    Returns
+    -------
+    array, shape (N, rows, M)
+
+    Raises
+    ------
+    RequestError
+        Unknown names, no direction given, shapes that do not fit.
+
+    Examples
+    --------
+    >>> times, states = np.zeros(3), np.zeros((3, 8))
+    >>> directions = np.zeros((3, 8, 2))  # two of them
+    >>> numbers, u = model.numbers(), model.inputs_at(0.0)
+    >>> force = output_tangents(
+    ...     model, numbers, "ball.force", t=times, x=states, u=u, dx=directions
+    ... )
+    >>> force.shape  # [N]: samples, balls, directions
+    (3, 8, 2)
+    """
+    count, given = len(t), [d for d in (dx, du, dp, dc, dt) if d is not None]
+    if not given:
+        raise RequestError("output_tangents: no direction was given. Give one or more of dx, du, dp, dc, dt.")
+    moves = given[0].shape[-1]
+    sizes = {"dx": len(model.states), "du": len(model.manifest.inputs), "dp": len(numbers.p), "dc": len(numbers.c)}
+
+    def shaped(value: Array | None, shape: tuple[int, ...], name: str) -> Array:
+        if value is None:
+            return np.broadcast_to(0.0, shape)
+        try:
+            return np.broadcast_to(np.asarray(value, dtype=float), shape)
+        except ValueError as fault:
+            raise RequestError(f"output_tangents: {name} of shape {shape} is expected, not {value.shape}.") from fault
+
+    along_x = shaped(dx, (count, sizes["dx"], moves), "dx")
+    along_u = shaped(du, (count, sizes["du"], moves), "du")
+    along_p, along_c = shaped(dp, (sizes["dp"], moves), "dp"), shaped(dc, (sizes["dc"], moves), "dc")
+    along_t = shaped(dt, (count, moves), "dt")
+    fixed = {"p": numbers.p, "c": numbers.c}
+    varying = {
+        "t": shaped(t, (count,), "t"),
+        "x": shaped(x, (count, sizes["dx"]), "x"),
+        "u": shaped(u, (count, sizes["du"]), "u"),
+    }
+    parts = []
+    for rows in rows_of(model, of):
+        loop = model.loop(f"{rows.function}_tangent", ("t", "x", "u", "dt", "dx", "du"))
+        (result,) = loop.function.name_out()
+        part = np.empty((count, len(rows.indices), moves))
+        for m in range(moves):
+            moved = {
+                "dt": along_t[:, m],
+                "dx": along_x[:, :, m],
+                "du": along_u[:, :, m],
+                "dp": along_p[:, m],
+                "dc": along_c[:, m],
+            }
+            part[:, :, m] = loop(count, {**fixed, **varying, **moved})[result][:, rows.indices]
+        parts.append(part)
+    return np.concatenate(parts, axis=1)
