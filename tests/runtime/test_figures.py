@@ -565,6 +565,15 @@ def test_a_load_by_a_table_is_shaded_where_it_is_not_zero(make_virtual: Callable
         assert np.degrees(other.load_windows()).tolist() == [pytest.approx(window) for window in expected], changed
 
 
+def test_a_ball_in_a_spall_is_no_applied_load(make_virtual: Callable[..., Model]) -> None:
+    sizes = 'profile = "half-sine"\nangle = "90 deg"\nchord = "1 mm"\ndepth = "9 um"\n'
+    places = ('on = "outer"\n', 'on = "inner"\n', 'on = "ball"\nball = 1\n')
+    spalls = "".join(f"[bearing.defects.spall_{k}]\n{place}{sizes}\n" for k, place in enumerate(places))
+    model = make_virtual("punching_press", ("[bearing.initial]", f"{spalls}[bearing.initial]"))
+    record = gather(model, model.simulate(cycles=0.01, transient=0))
+    assert np.degrees(record.load_windows()) == pytest.approx(np.array([[237.0, 267.0]]))
+
+
 def luminance(colour: tuple[float, float, float]) -> float:
     """CIE lightness L* of an sRGB colour (IEC 61966-2-1, CIE 15)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]

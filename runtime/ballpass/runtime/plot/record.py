@@ -138,9 +138,11 @@ class Record:
     def load_window_edges(self) -> list[tuple[str, str]]:
         """Parameters at which these windows start and end; of a table over the angle, where it is not zero."""
         found: list[tuple[str, str]] = []
+        bearings = tuple(f"{bearing.path}." for bearing in self.manifest.bearings)
         for item in self.manifest.inputs:
             turning = item.kind == "table" and item.rate
-            if turning and self.table_turns(item.name) > 1:
+            spall = any(edge.startswith(bearings) for window in item.windows for edge in window)
+            if spall or (turning and self.table_turns(item.name) > 1):
                 continue
             found += _acting_rows(item, self.parameter) if turning else item.windows
         return found
