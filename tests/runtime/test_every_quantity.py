@@ -100,9 +100,7 @@ def test_commands_and_data_sets_give_that_value(
     """`ballpass run`, `ballpass sweep` and a data set: to the last bit at equal options."""
     model = make_model(scene)
     here = model.parameters[CLEARANCE]
-    signals = Signals(
-        outputs=("inner.y",), sample_rate=10e3, duration=0.12, transient=0.06, rtol=1e-9, quantities=names
-    )
+    signals = Signals(outputs=("inner.y",), sample_rate=10e3, duration=0.2, transient=0.06, rtol=1e-9, quantities=names)
     length = {
         "duration": float(signals.times[-1]),
         "transient": signals.transient / period(model.manifest, model.numbers().values),

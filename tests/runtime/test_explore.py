@@ -255,6 +255,26 @@ def test_pages_of_further_machines_give_native_peaks(
     assert not browser.complaints
 
 
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+def test_work_and_spectrum_of_a_run_that_ends_within_a_turn_are_those_of_whole_turns(
+    make_model: Callable[..., Model], browser: Page, tmp_path: Path
+) -> None:
+    """Of an engine, whose loads repeat after two."""
+    model = make_model("engine", ("cycles = 8 ", "cycles = 7.6 "))
+    browser.open(model.explore(tmp_path / "page.html"))
+    work = model.quantities(["drive_work"], cycles=8)["drive_work"].value
+    assert shown(browser)["drive_work"] == pytest.approx(work, rel=1e-4)
+    steady = model.simulate().steady()
+    count = 3 * model.run_settings.samples_per_cycle
+    motion = [1e6 * (steady[f"inner.{axis}"] - steady[f"outer.{axis}"])[-1 - count : -1] for axis in "xy"]
+    native = 2.0 / count * np.hypot(*(np.abs(np.fft.rfft(one)) for one in motion))[1:121]
+    lines = np.array(browser.value("spectrumOf(current, 0)"))
+    assert lines[:, 0] == pytest.approx(np.arange(1, 121) / (3.0 * model.period()), rel=1e-9)
+    assert lines[:, 1] == pytest.approx(native, abs=1e-3 * float(native.max()))
+
+
 def _signals(numbers: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     if isinstance(numbers, dict):
         if "decimals" in numbers:

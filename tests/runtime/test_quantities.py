@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 
@@ -71,6 +72,25 @@ def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_mode
     assert report.quantities[1].value == pytest.approx(work / speed, rel=1e-9)
     assert report["integral:drive_torque", names[0]].derivative == pytest.approx(work / force / speed, rel=1e-8)
     assert report["integral:drive_torque", names[3]].dimensionless == pytest.approx(-1.0, abs=1e-10)
+
+
+@pytest.mark.parametrize("scene", ["punching_press", pytest.param("engine", marks=pytest.mark.long)])
+def test_drive_work_of_a_run_that_ends_within_a_turn_is_that_of_whole_turns(
+    make_model: Callable[..., Model], scene: str
+) -> None:
+    """Of as many turns as loads repeat after: an engine fires in every second one."""
+    model, speed = make_model(scene), "mechanism.driver.speed"
+    whole = model.quantities(["drive_work"], cycles=5, transient=1)["drive_work"].value
+    for cycles, transient in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.75), (4.0, 1.5)):
+        report = model.sensitivity(["drive_work"], [speed], cycles, transient=transient, check=False)
+        assert report.quantities[0].value == pytest.approx(whole, rel=1e-9), (cycles, transient)
+        assert abs(report["drive_work", speed].dimensionless) < 1e-9
+        for method in ("auto", "cvodes"):
+            run = model.simulate(cycles=cycles, transient=transient, method=method)
+            assert summarize(model, run)["drive_work"]["value"] == pytest.approx(whole, rel=1e-6)
+    with pytest.raises(RequestError, match="drive_work: the time that counts holds no whole turn"):
+        model.quantities(["drive_work"], cycles=1.5, transient=0.75)
+    assert "drive_work" not in summarize(model, model.simulate(cycles=1.5, transient=0.75))
 
 
 @pytest.mark.long

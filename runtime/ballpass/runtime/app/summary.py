@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ballpass.runtime.app.summary_words import inside, row_place, row_words
-from ballpass.runtime.ask.observables import statistics, turns
+from ballpass.runtime.ask.observables import statistics
 from ballpass.runtime.ask.peaks import Kind, Peak, has_quantities, refine_peaks, run_of
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
@@ -33,6 +33,7 @@ from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.kinds.drive_work import whole_cycles
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.ratings.result_limits import VOID, limit_words, passed_limit
@@ -260,26 +261,29 @@ def _forces(model: Model, sol: Solution, peaks: Mapping[tuple[str, Kind], Peak])
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
             found[info.name]["searched"] = {"min": low.searched, "max": high.searched}
-    if "drive_torque" in found and _has_turn(sol):
-        found["drive_work"] = _numbers("drive_torque", "J", value=_drive_work(model, sol))
+    work = _drive_work(model, sol) if "drive_torque" in found else None
+    if work is not None:
+        found["drive_work"] = _numbers("drive_torque", "J", value=work)
     return found
 
 
-def _has_turn(sol: Solution) -> bool:
-    """Whether the driver makes a whole turn at constant speed."""
-    mechanism, length = sol.manifest.mechanism, sol.period
-    return mechanism is not None and not mechanism.angle and length is not None and bool(turns(sol.t, length))
+def _drive_work(model: Model, sol: Solution) -> float | None:
+    """Work of the drive in a turn [J]: the quantity, where the output follows from time or from steps.
 
-
-def _drive_work(model: Model, sol: Solution) -> float:
-    """Work of the drive in a turn [J]: the quantity, where the output follows from time or from steps."""
-    numbers = model.numbers(sol.parameters)
+    None where the driver's speed changes, or makes no whole turn.
+    """
+    mechanism, numbers = sol.manifest.mechanism, model.numbers(sol.parameters)
+    if mechanism is None or mechanism.angle or sol.period is None:
+        return None
+    run = run_of(model, numbers, sol)
+    window = whole_cycles(run)
+    if window is None:
+        return None
     if has_quantities(sol, "drive_torque", model):
-        quantities = quantities_of(model, ["drive_work"])
-        return float(QuantityRun(model, quantities).measure(run_of(model, numbers, sol)).values[0])
-    assert sol.manifest.mechanism is not None  # it has a torque
-    angle = math.copysign(TURN, sol.parameters[sol.manifest.mechanism.speed])
-    return angle * statistics(sol.t, sol["drive_torque"]).mean
+        return float(QuantityRun(model, quantities_of(model, ["drive_work"])).measure(run).values[0])
+    begin, end = np.searchsorted(sol.t, np.array(window) + 1e-9 * sol.period * np.array([-1.0, 1.0]))
+    torque = statistics(sol.t[begin:end], sol["drive_torque"][begin:end])
+    return math.copysign(TURN, sol.parameters[mechanism.speed]) * torque.mean
 
 
 def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 // ------------------------------------------------------------------------------------------------- numbers and sliders
 const list = solver.parameters, own = list.map((one) => one.value), values = own.slice(), rows = [];
 const written = (value, digits = 6) => {
+  if (Number.isNaN(value)) return "\u2013";
   const short = Number(value.toPrecision(digits)), size = Math.abs(short);
   return size && (size < 1e-3 || size >= 1e6) ? short.toExponential().replace("+", "") : String(short);
 };
@@ -80,6 +81,18 @@ function readAddress() {
 // -------------------------------------------------------------------------------------------------------------- results
 const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) + 360) % 360).toFixed(1)}\u00b0 of turn ${Math.floor(time / run.turn + 1e-9) + 1}`;
 
+// The last whole turns after which loads repeat, from a whole turn on, as native runs take them; null where there are none.
+function wholeCycles({ nodes, turn }) {
+  const near = 1e-9, [first, last] = [nodes[0][0] / turn, nodes.at(-1)[0] / turn];
+  for (const end of [last, Math.floor(last + near)]) {
+    const count = solver.shown * Math.floor((end - first) / solver.shown + near), begin = end - count;
+    if (count > 0 && Math.min(Math.abs(begin - first), Math.abs(begin - Math.round(begin))) < near * Math.max(last, 1)) {
+      return { nodes: nodes.filter(([time]) => time / turn > begin - near && time / turn < end + near) };
+    }
+  }
+  return null;
+}
+
 // Rows of the table: key, words, unit, value, where.
 function resultsOf(run) {
   const found = [], measures = [], series = [], forces = [];
@@ -111,7 +124,10 @@ function resultsOf(run) {
   if (solver.torque !== null) {
     peak("peak_torque", "Highest drive torque, either way", "N\u00b7m", (row) => Math.abs(row[solver.torque]));
     shortly("torque");
-    if (run.speed && solver.angle === null) rest("drive_work", "Work of the drive in a turn", "J", Math.sign(run.speed) * TURN * mean(run, measured(run, (row) => row[solver.torque])));
+    if (run.speed && solver.angle === null) {
+      const part = wholeCycles(run);
+      rest("drive_work", "Work of the drive in a turn", "J", part ? Math.sign(run.speed) * TURN * mean(part, measured(part, (row) => row[solver.torque])) : NaN);
+    }
   }
   const tops = peaks(run, measures, series);
   // of ball forces the highest of any step, which samples may miss by far
@@ -121,7 +137,7 @@ function resultsOf(run) {
 }
 
 const difference = (now, old) => {
-  if (now === old) return "\u2013";
+  if (Object.is(now, old)) return "\u2013";
   const ratio = now / old, share = 100 * (now - old) / Math.abs(old);
   if (!Number.isFinite(share)) return "new";
   if (ratio >= 10) return `\u00d7${written(ratio, 3)}`;
@@ -180,7 +196,7 @@ function drawLoad(bearing, number) {
 
 // Amplitudes of the rings' motion at whole parts of the record's frequency, as far as 40 a turn; Hann's window where turns hold no whole period.
 function spectrumOf(run, number) {
-  const bearing = solver.bearings[number], turns = run.turn < Infinity ? Math.min(Math.round((run.rows.at(-1)[0] - run.rows[0][0]) / run.turn), 4) : 0;
+  const bearing = solver.bearings[number], turns = run.turn < Infinity ? Math.min(Math.floor((run.rows.at(-1)[0] - run.rows[0][0]) / run.turn + 1e-6), 4) : 0;
   const size = turns ? Math.round(turns * solver.run.samples) : run.rows.length - 1, from = run.rows.length - 1 - size, lines = Math.min(40 * (turns || 5), Math.floor(size / 2)), hann = !solver.linkage;
   const motion = run.rows.slice(from, from + size).map((row) => motionOf(bearing, row));
   const middle = [0, 1].map((axis) => motion.reduce((sum, one) => sum + one[axis], 0) / size);

@@ -1,20 +1,56 @@
-"""Work of the drive in a turn."""
+"""Work of the drive in a turn: mean of the last whole turns after which all loads repeat."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
-from ballpass.runtime.run.driver_angle import TURN
+from ballpass.runtime.run.driver_angle import TURN, cycle_turns
+from ballpass.runtime.run.resolve import Run
+
+#: Part of a turn by which times miss it by rounding.
+_NEAR = 1e-9
+
+
+def whole_cycles(run: Run) -> tuple[float, float] | None:
+    """Begin and end of the last whole turns that count [s]: as many as loads repeat after, or several times that.
+
+    They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what counts.
+    None where it holds none.
+    """
+    cycle = cycle_turns(run.numbers.values)
+    first, last = run.start / run.turn, run.end / run.turn
+    for end in (last, math.floor(last + _NEAR)):
+        count = cycle * math.floor((end - first) / cycle + _NEAR)
+        begin = end - count
+        if count and min(abs(begin - first), abs(begin - round(begin))) < _NEAR * max(last, 1.0):
+            return begin * run.turn, end * run.turn
+    return None
 
 
 def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
-    value, slope = view.mean(*view.channel(quantity))
+    window, nodes = whole_cycles(view.run), view.nodes
+    if window is None:
+        raise RequestError(
+            f"{quantity.name}: the time that counts holds no whole turn of the driver, or as many as all loads repeat "
+            "after, from a whole turn on. Run longer."
+        )
+    near = _NEAR * view.run.turn
+    within = (window[0] - near < nodes.t) & (nodes.t < window[1] + near)
+    whole = replace(
+        nodes,
+        weight=np.where(within, nodes.weight, 0.0),
+        weight_slope=np.where(within[:, None], nodes.weight_slope, 0.0),
+    )
+    value, slope = replace(view, nodes=whole).mean(*view.channel(quantity))
     # mean torque times the angle of a turn, which does not depend on parameters
     angle = math.copysign(TURN, view.numbers.values[mechanism.speed])
     return Estimate(value=angle * value, slope=angle * slope)
