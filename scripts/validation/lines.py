@@ -73,12 +73,7 @@ def lines_of(
     rate, nominal : samples a second, and the shaft's nominal speed [Hz]
     order : of the ball pass, about
     """
-    time = np.arange(signal.size) / rate
-    squared = envelope(time, signal, BAND) ** 2
-    count = 4 * signal.size
-    height = np.abs(np.fft.rfft((squared - squared.mean()) * np.hanning(signal.size), count))
-    frequency = np.fft.rfftfreq(count, 1.0 / rate)
-    floor = float(np.median(height[(frequency > FLOOR[0]) & (frequency < FLOOR[1])]))
+    frequency, height, floor = squared_envelope(signal, rate, 4)
 
     def peak(near: float, width: float) -> tuple[float, float]:
         among = np.flatnonzero(np.abs(frequency - near) < width)
@@ -106,17 +101,47 @@ def lines_of(
     )
 
 
+def squared_envelope(signal: Array, rate: float, padded: int) -> tuple[Array, Array, float]:
+    """Frequencies [Hz] and heights of its spectrum, so many times zero padded, and the height of the floor."""
+    time = np.arange(signal.size) / rate
+    squared = envelope(time, signal, BAND) ** 2
+    spectrum = np.fft.rfft((squared - squared.mean()) * np.hanning(signal.size), padded * signal.size)
+    height: Array = np.asarray(np.abs(spectrum), dtype=float)
+    frequency: Array = np.asarray(np.fft.rfftfreq(padded * signal.size, 1.0 / rate), dtype=float)
+    return frequency, height, float(np.median(height[(frequency > FLOOR[0]) & (frequency < FLOOR[1])]))
+
+
+def mean_line(signals: Sequence[Array], rate: float, shafts: Sequence[float], order: float) -> tuple[float, float]:
+    """Order of the highest line near an order in the mean of spectra over it, and its height over the floor [1].
+
+    Parameters
+    ----------
+    shafts : speeds [Hz]
+    """
+    orders, total = order * np.linspace(1.0 - AROUND, 1.0 + AROUND, 2001), np.zeros(2001)
+    for signal, shaft in zip(signals, shafts, strict=True):
+        frequency, height, floor = squared_envelope(signal, rate, 16)
+        total += np.interp(orders * shaft, frequency, height / floor) / len(signals)
+    k = int(np.argmax(total))
+    return float(orders[k]), float(total[k])
+
+
 def read_cwru(folder: Path, orders: dict[str, float], spalls: dict[int, str]) -> list[SpallLines]:
     """Drive-end recordings at 12 kHz; `spalls` says what each file number has.  Load in horsepower."""
     found = []
     for number, spall in spalls.items():
         path = only(folder, f"{number}*.mat")
-        data = loadmat(path, squeeze_me=True)
-        signal = np.asarray(next(data[key] for key in data if key.endswith("DE_time")), dtype=float)
-        speed = float(next(data[key] for key in data if key.endswith("RPM"))) / 60.0
+        signal, speed = drive_end(path)
         load = float((re.search(r"_(\d)\.mat$", path.name) or ["", "nan"])[1])
         found.append(lines_of(signal, 12000.0, speed, orders[spall], file=str(number), spall=spall, load=load))
     return found
+
+
+def drive_end(path: Path) -> tuple[Array, float]:
+    """Signal of the drive end, and the speed that the file states [Hz]."""
+    data = loadmat(path, squeeze_me=True)
+    signal = np.asarray(next(data[key] for key in data if key.endswith("DE_time")), dtype=float)
+    return signal, float(next(data[key] for key in data if key.endswith("RPM"))) / 60.0
 
 
 def read_mfpt(folder: Path, orders: dict[str, float]) -> list[SpallLines]:
