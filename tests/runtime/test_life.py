@@ -73,6 +73,29 @@ def test_under_a_load_that_stands_both_readings_agree_whichever_ring_turns(
         assert single[name].value == pytest.approx(report.lives[name.removeprefix("life_")], rel=1e-3)
 
 
+def test_the_ring_of_a_body_that_swings_stands(make_model: Callable[..., Model]) -> None:
+    """The rod carries the inner ring, in which the force of a slider without inertia stands: all readings agree."""
+    model = make_model(
+        "punching_press_two_way",
+        ('joint = "A"\ncoupling', 'joint = "B"\ncoupling'),
+        ("count = 2 ", "count = 1 "),
+        ('support = "elastic"\nmass = "0.555 kg"', 'support = "fixed"\n#mass = "0.555 kg"'),
+        ('stiffness = "5e7 N/m"', "#"),
+        ('damping = "500 N*s/m"', "#"),
+        ('outer = ["0 um", "0 um"]\nouter_velocity = ["0 m/s", "0 m/s"]', ""),
+        ("[bearing.outer_ring]", '[bearing.inner_ring]\nbody = "rod"\n[bearing.outer_ring]'),
+        ('window = { start = "237 deg", end = "267 deg" }', ""),
+        ('"outer.*", ', ""),
+    )
+    numbers = {"mechanism.driver.speed": 10.0}
+    (report,) = model.life(cycles=20, transient=2, parameters=numbers).bearings
+    single = model.quantities(READINGS, cycles=20, transient=2, parameters=numbers)
+    lanes = model.simulate_many({name: [value] for name, value in numbers.items()}, READINGS, cycles=20, transient=2)
+    for name in READINGS:
+        found = report.lives[name.removeprefix("life_")], single[name].value, float(lanes[name][0])
+        assert found == pytest.approx([report.lives["sectors"]] * 3, rel=0.02), name
+
+
 @pytest.mark.long
 def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press")

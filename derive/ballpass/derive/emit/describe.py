@@ -109,6 +109,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
     driven = system.linkage.driven if system.linkage is not None else ""
     laws = [dict(bearing.laws).get("damping") for bearing in system.bearings]
+    constants = {constant.symbol.name for constant in system.constants}
     return tuple(
         mf.BearingInfo(
             name=bearing.name,
@@ -132,6 +133,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             alignment=alignment_info(bearing),
             element=bearing.element,
             inner_stands=bearing.inner_body == FRAME or (scene.shaft is not None and scene.shaft.ring == "outer"),
+            inner_turns=turns if (turns := f"body.{bearing.inner_body}.turns") in constants else "",
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

@@ -257,7 +257,8 @@ class BearingInfo:
     ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
     `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
-    whether the inner ring stands in the frame and the outer one turns.
+    whether the inner ring makes no whole turns; `inner_turns` names the constant with the number of its whole turns in
+    a turn of the driver, where that decides.
     """
 
     name: str
@@ -273,12 +274,17 @@ class BearingInfo:
     lubrication: LubricationInfo | None = None
     element: str = "ball"
     inner_stands: bool = False
+    inner_turns: str = ""
     alignment: AlignmentInfo | None = None
 
     @property
     def moves_linkage(self) -> bool:
         """Whether bearing and linkage move each other: coupled two-way."""
         return self.ring_speed.startswith(f"{self.path}.")
+
+    def stands_inside(self, values: Mapping[str, Any]) -> Any:
+        """Whether the inner ring makes no whole turns at these parameters and constants, numbers or arrays."""
+        return values[self.inner_turns] == 0.0 if self.inner_turns else self.inner_stands
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

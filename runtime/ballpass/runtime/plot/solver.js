@@ -104,7 +104,7 @@ const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * v
 
 // Rating life of a bearing [h], the shortest of the readings of `ballpass life`, over the passes of this run; 0 where its
 // rings do not turn against each other.
-function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors, inner_stands } }) {
+function lifeOf({ nodes, ratings, known }, { cage, force, life: { turning, standing, weibull, sectors, inner_stands, inner_turns } }) {
   const seen = (node, ring) => node[seenAt + 2 * cage + ring], apart = nodes.map((node) => seen(node, 0) - seen(node, 1));
   // how far the rings turn from one node to the next; angles of cages come back after a turn
   const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
@@ -138,7 +138,8 @@ function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, we
   });
   const turns = ([first, second]) => 1e6 * ((first / ratings[2 * cage]) ** standing + (second / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
   const speed = passes / (nodes[last][0] - nodes[0][0]);
-  const readings = [[cubic, mean], [cubic, miner]].map((pair) => inner_stands ? pair.reverse() : pair);
+  const stands = inner_turns === null ? inner_stands : known[inner_turns] === 0;
+  const readings = [[cubic, mean], [cubic, miner]].map((pair) => stands ? pair.reverse() : pair);
   return Math.min(...[...readings, [onInner, onOuter]].map(turns)) * TURN / speed / 3600;
 }
 

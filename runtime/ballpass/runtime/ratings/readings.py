@@ -49,7 +49,7 @@ class LoadPowers:
     turning : of the power of the balls' loads that damages a turning ring, over the balls as well; of balls [kN^3]
     standing : of the power that damages a standing ring; of balls [kN^(10/3)]
     standing_damage : of the mean over the balls of the latter, to the power that makes damage of it; of balls [kN^3]
-    inner_stands : whether the inner ring stands and the outer one turns
+    inner_stands : whether the inner ring makes no whole turns, and the outer one does
     raceways : of the first power at each place of the outer, then of the inner raceway, over the balls that pass,
         shape (..., 2, places) ; None where it is not known
     """
@@ -61,7 +61,7 @@ class LoadPowers:
     raceways: Any = None
 
 
-def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[Any, Any]]:
+def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[Any, ...]]:
     """Q_ei and Q_ee of every reading [N]; not of `sectors` where the raceways are not known."""
     root = float(1 / of.turning)
     turning = KILO * powers.turning**root
@@ -69,7 +69,9 @@ def equivalent_loads(powers: LoadPowers, of: ElementLife) -> Mapping[str, tuple[
         "mean": (turning, KILO * powers.standing ** float(1 / of.standing)),
         "miner": (turning, KILO * powers.standing_damage**root),
     }
-    found = {name: pair[::-1] if powers.inner_stands else pair for name, pair in pairs.items()}
+    found = {
+        name: tuple(np.where(powers.inner_stands, *both) for both in (pair[::-1], pair)) for name, pair in pairs.items()
+    }
     if powers.raceways is not None:
         places = (np.moveaxis(powers.raceways[..., ring, :], -1, 0) for ring in (1, 0))
         found["sectors"] = tuple(KILO * sector_ball_load(place, of) for place in places)

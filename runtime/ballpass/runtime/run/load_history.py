@@ -114,12 +114,12 @@ def _history(going: ReducedRun) -> LoadHistory:
         speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
     powers, peaks, speeds = {}, {}, {}
     for bearing in manifest.bearings:
-        found = load_powers(manifest, bearing, going.row[None, :])
+        found = load_powers(manifest, bearing, going.row[None, :], going.run.numbers.values)
         powers[bearing.prefix] = LoadPowers(
             turning=float(found.turning[0]),
             standing=float(found.standing[0]),
             standing_damage=float(found.standing_damage[0]),
-            inner_stands=bearing.inner_stands,
+            inner_stands=bearing.stands_inside(going.run.numbers.values),
             raceways=found.raceways[0],
         )
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)

@@ -248,13 +248,24 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
     )
 
 
-def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> LoadPowers:
-    """Mean powers of a bearing's ball loads over its passes from reductions, shape (members, .)."""
+def load_powers(
+    manifest: Manifest, bearing: BearingInfo, rows: np.ndarray, values: Mapping[str, float | np.ndarray]
+) -> LoadPowers:
+    """Mean powers of a bearing's ball loads over its passes from reductions, shape (members, .).
+
+    Parameters
+    ----------
+    values : parameters and derived constants by name, numbers or of shape (members,)
+    """
     layout = reduction_rows(manifest)
     every = {name: rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS}
     turned = np.where(every[TURNED] > 0.0, every[TURNED], np.inf)  # no pass, no damage
     turning, standing, damage = (every[f"load.{name}"] / turned for name in ("turning", "standing", "standing_damage"))
     places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
     return LoadPowers(
-        turning=turning, standing=standing, standing_damage=damage, inner_stands=bearing.inner_stands, raceways=places
+        turning=turning,
+        standing=standing,
+        standing_damage=damage,
+        inner_stands=bearing.stands_inside(values),
+        raceways=places,
     )

@@ -53,7 +53,7 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     ratings, moved_ratings = _ratings(view, bearing)
     passes = _over_passes(view, prefix)
     powers, moved_powers = (
-        replace(one, inner_stands=bearing.inner_stands)
+        replace(one, inner_stands=bearing.stands_inside(view.numbers.values))
         for one in _powers(passes, quantity, prefix, ratings.life, raceways="sectors" in readings)
     )
     found = lives(ratings, powers)
@@ -167,7 +167,7 @@ def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) 
 
 def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> Array:
     bearing = _bearing(runs.manifest, quantity)
-    found = lives(ratings_of(bearing, runs.values), load_powers(runs.manifest, bearing, runs.rows))
+    found = lives(ratings_of(bearing, runs.values), load_powers(runs.manifest, bearing, runs.rows, runs.values))
     return np.asarray(np.min([found[reading] for reading in readings], axis=0))
 
 
