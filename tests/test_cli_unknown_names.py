@@ -108,7 +108,7 @@ def said(command: str, scene: Path, given: Mapping[str, str]) -> str:
 def in_python(model: Model, command: str, given: Mapping[str, str]) -> str | None:
     """The message of the same request; None where it is for the command line alone."""
     calls: dict[str, Callable[[], Any]] = {
-        "run": lambda: model.quantities(given["of"]),
+        "run": lambda: model.quantities(given["of"]) if "of" in given else model.simulate(method=given["method"]),
         "sweep": lambda: model.simulate_many(
             {"bearing.clearance": [1e-6]}, given.get("of", "rms:inner.y"), method=given.get("method")
         ),

@@ -122,6 +122,17 @@ def bearings(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
             bearing_named(manifest, text)
 
 
+def methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
+    """Methods of all models, with a compiler and without one."""
+    from ballpass.runtime.contract.method_registry import STEPPERS
+    from ballpass.runtime.native.casadi_integrators import METHODS
+
+    known = ("auto", *STEPPERS, *METHODS)
+    for text in texts:
+        if text not in known:
+            raise RequestError(unknown_name("method", text, known))
+
+
 def stepper_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Methods of the project's own stepper, of which every scene has the same."""
     from ballpass.runtime.run.choose_method import stepper_method

@@ -299,7 +299,7 @@ def _source(
             raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")
         return load_solution(scene), {}
     asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
-    method = (values.get("method") or asked.run.method) if question.runs else "none"
+    method = (values.get("method") or asked.method) if question.runs else "none"
     needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
     model = load_model(
         scene,

@@ -36,7 +36,7 @@ def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> No
         check_compiler()
         asked = read_asked(scene, None)
         path = results_file(out, scene, "explore.html", ("html",))
-        model = load_model(scene, stages, asked.run.method, overrides={})
+        model = load_model(scene, stages, asked.method, overrides={})
         stages("compile for pages")
         path.parent.mkdir(parents=True, exist_ok=True)
         model.explore(path, units={} if scene.is_dir() else scene_units(scene, model.manifest))

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
@@ -20,10 +20,7 @@ from ballpass.runtime.plot import FORMATS
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.records import RunSettings
-    from ballpass.runtime.contract.manifest import Manifest, RunInfo
-
-_Run = TypeVar("_Run", bound="RunSettings | RunInfo")
+    from ballpass.runtime.contract.manifest import Manifest
 
 #: Lines of a scene's run table that have an option of ``ballpass run``.
 RUN_OPTIONS = {
@@ -37,18 +34,10 @@ RUN_OPTIONS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """Data of a scene that a command needs before it has a model.
+    """Data of a scene that a command needs before it has a model: its method, numbers of ``--set`` by path [SI]."""
 
-    Attributes
-    ----------
-    run : its run settings, with the options of the command applied
-    overrides : numbers of ``--set`` by path [SI]
-    speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
-    """
-
-    run: RunSettings | RunInfo
+    method: str
     overrides: dict[str, float]
-    speed: float
 
 
 def read_asked(
@@ -61,26 +50,15 @@ def read_asked(
     """
     if path.is_dir():
         present = read_manifest(path)
-        return _of_manifest(present, _overrides_of(present, settings or []), duration, transient)
+        return Asked(method=present.run.method, overrides=_overrides_of(present, settings or []))
     from ballpass.derive.emit.signature import fresh_manifest
 
     manifest = fresh_manifest(path)
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
-        return _of_manifest(manifest, overrides, duration, transient)
+        return Asked(method=manifest.run.method, overrides=overrides)
     _, scene, overrides = read_with_settings(path, settings, duration, transient)
-    shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
-    speed = shaft.value if shaft is not None else 0.0
-    return Asked(run=_asked_run(scene.run, duration, transient), overrides=overrides, speed=speed)
-
-
-def _of_manifest(
-    manifest: Manifest, overrides: dict[str, float], duration: float | None, transient: float | None
-) -> Asked:
-    names = [m.speed for m in (manifest.mechanism,) if m] + [b.ring_speed for b in manifest.bearings]
-    values = {info.name: info.default for info in manifest.parameters} | overrides
-    speed = values.get(names[0], 0.0) if names else 0.0
-    return Asked(run=_asked_run(manifest.run, duration, transient), overrides=overrides, speed=speed)
+    return Asked(method=scene.run.method, overrides=overrides)
 
 
 def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
@@ -127,14 +105,6 @@ def read_value(option: str, text: str, unit: str) -> float:
     if not math.isfinite(value):
         raise RequestError(f"{option}: {text!r} is no finite quantity.")
     return value
-
-
-def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
-    """Run settings with a duration, where one was asked for."""
-    if duration is None:
-        return run
-    dropped = run.transient_cycles if transient is None else transient
-    return replace(run, cycles=None, duration=duration, transient_cycles=dropped)
 
 
 def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
@@ -187,7 +157,11 @@ def read_with_settings(
         overrides[name], texts[name] = value, given
     if faults:
         raise SceneError(faults, source="--set")
-    asked = replace(read, run=_asked_run(read.run, duration, transient))
+    run = read.run
+    if duration is not None:
+        dropped = run.transient_cycles if transient is None else transient
+        run = replace(run, cycles=None, duration=duration, transient_cycles=dropped)
+    asked = replace(read, run=run)
     try:
         return read, with_values(asked, overrides) if overrides else asked, overrides
     except SceneError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import Asked, read_asked, read_formats
+from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import (
     Stages,
     can_draw,
@@ -28,7 +27,6 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.app.commands.trade import read_error
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.options import (
     Cycles,
@@ -54,6 +52,11 @@ Of = Annotated[
         shown="Q",
         names=option_names.quantities,
     ),
+]
+
+Method = Annotated[
+    str | None,
+    Option(words=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.", shown="NAME", names=option_names.methods),
 ]
 
 #: Bytes of samples that are written without a remark.
@@ -86,13 +89,7 @@ def run(
     ] = None,
     set_: options.Settings = None,
     rtol: Rtol = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.",
-        ),
-    ] = None,
+    method: Method = None,
     kinks: Annotated[
         str | None,
         typer.Option(
@@ -138,8 +135,7 @@ def run(
         formats = read_formats(format_)
         asked = read_asked(scene, set_, duration, transient)
         start = _read_start(initial)
-        _check_request(asked, cycles, transient, method, goes_on=start not in (None, "equilibrium"))
-        at_kinks = checked_kinks(kinks, method or asked.run.method, error)
+        at_kinks = checked_kinks(kinks, method or asked.method, error)
         target = read_error(error, method, rtol)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
@@ -147,7 +143,7 @@ def run(
         model = load_model(
             scene,
             stages,
-            method or asked.run.method,
+            method or asked.method,
             kinks,
             rtol,
             overrides=asked.overrides,
@@ -265,39 +261,6 @@ def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
     from ballpass.runtime.run.solution_file import load_solution
 
     return load_solution(text).end
-
-
-def _check_request(
-    asked: Asked,
-    cycles: float | None,
-    transient: float | None,
-    method: str | None,
-    *,
-    goes_on: bool = False,
-) -> None:
-    """Refuse options that no model allows, before anything is derived or written; `goes_on`: from another run."""
-    from ballpass.runtime.contract.parameters import unknown_name
-    from ballpass.runtime.native.casadi_integrators import METHODS
-
-    known = ("auto", *STEPPERS, *METHODS)
-    if method is not None and method not in known:
-        raise RequestError(f"--method: {unknown_name('method', method, known)}")
-    speed = abs(asked.speed)
-    if cycles is not None and speed == 0.0:
-        raise RequestError(
-            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or a "
-            'time instead of turns: --duration "0.5 s".'
-        )
-    turns = cycles if cycles is not None else asked.run.cycles
-    if turns is None:
-        turns = (asked.run.duration or 0.0) * speed / math.tau
-    dropped = asked.run.transient_cycles if transient is None else transient
-    if dropped > 0.0 and turns <= dropped and not goes_on:
-        raise RequestError(
-            f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
-            f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
-            "(--transient 0)."
-        )
 
 
 def _write_results(
