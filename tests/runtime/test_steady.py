@@ -249,6 +249,42 @@ def test_what_has_no_common_period_is_refused_with_fractions_nearby(make_model: 
         press.steady(over="bearing.pitch_diameter=31.75 mm:33.5 mm")
 
 
+def test_a_period_over_a_range_holds_within_it_too(make_model: Callable[..., Model]) -> None:
+    """A load of 50 to 100 Hz on a shaft of 50 Hz repeats each turn at both ends, and not between them."""
+    load = """[loads.harmonic]
+type = "harmonic"
+mean = ["0 N", "0 N"]
+amplitude = ["10 N", "0 N"]
+frequency = "50 Hz"
+phase = "0 deg"
+
+[bearing]
+"""
+    model = make_model("rotor", ("[bearing]\n", load))
+    with pytest.raises(RequestError, match=r"loads.harmonic.frequency: at its first end .* no period holds between"):
+        model.steady(over="loads.harmonic.frequency=50 Hz:100 Hz", parameters=THREE_EIGHTHS)
+    read = model.bifurcation(
+        "loads.harmonic.frequency=50 Hz:100 Hz:2", parameters=THREE_EIGHTHS, readings=20, settling=0, exponent=False
+    )
+    assert read.every == "once a turn, after which balls or loads are elsewhere"
+
+
+@pytest.mark.long
+def test_a_branch_over_an_amplitude_begins_at_none(make_model: Callable[..., Model]) -> None:
+    """The rates on which the equations depend are not the same at both ends."""
+    model = make_model("rotor", ("[bearing]\n", '[bearing.inner_waviness]\n3 = { amplitude = "0 um" }\n\n[bearing]\n'))
+    still = {**THREE_EIGHTHS, "loads.unbalance.mass": 0.0}
+    found = model.steady(over="bearing.inner_waviness.3.amplitude=0 um:0.1 um", parameters=still, transient=20.0)
+    last = found.branches[0].points[-1]
+    for value, state in ((0.0, found.start), (last.value, last.nodes[0])):
+        numbers = {**still, "bearing.inner_waviness.3.amplitude": value}
+        times = found.period * np.arange(3)
+        run = model.simulate(
+            duration=float(times[-1]), times=times, initial=state, parameters=numbers, outputs=[], rtol=1e-10
+        )
+        assert np.max(np.abs(run.x - state), axis=0) == pytest.approx(0.0, abs=1e-6 * float(np.max(np.abs(state))))
+
+
 def test_turns_after_which_the_balls_are_elsewhere_are_warned_of(rotor: Model) -> None:
     turns = PERIOD * rotor.parameters["shaft.speed"] / math.tau
     assert rotor.steady(turns).report().warnings == []

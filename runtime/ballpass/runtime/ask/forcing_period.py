@@ -29,6 +29,10 @@ LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
 #: Accelerations at one state a period apart, relative to the largest, that are the same [1].
 SAME = 1e-6
 
+#: Where in a range a period is compared beside its ends: the golden section, at which no ratio of speeds is one of small
+#: numbers because it is so at both ends [1].
+WITHIN_RANGE = 0.5 * (3.0 - math.sqrt(5.0))
+
 #: Change of a phase that shows whether the equations depend on it [rad].
 NUDGE = 0.7
 
@@ -112,6 +116,38 @@ def forcing_period(
     raise RequestError(
         f"steady: no period was found: after {float(count):g} turns of {base} the accelerations at one state differ by "
         f"{100.0 * found.difference:.2g} %. Give the period yourself: turns."
+    )
+
+
+def common_period(
+    model: LoadedModel,
+    parameters: Mapping[str, float],
+    over: ParameterRange,
+    times: np.ndarray,
+    states: np.ndarray,
+) -> ForcingPeriod:
+    """The shortest period of the equations that holds over a range of one parameter.
+
+    Parameters
+    ----------
+    parameters : overrides of others, SI
+    times, states : as for `forcing_period`
+
+    Raises
+    ------
+    RequestError
+        As for `forcing_period` at both ends, or no period holds between them.
+    """
+    first, last, within = (
+        model.numbers({**parameters, over.name: over.at(share)}) for share in (0.0, 1.0, WITHIN_RANGE)
+    )
+    ends = [forcing_period(model, numbers, times, states, None) for numbers in (first, last)]
+    for found in ends:
+        if all(_checked(model, one, times, states, found).difference <= SAME for one in (first, last, within)):
+            return found
+    raise RequestError(
+        f"{over.name}: at its first end {ends[0].words}, at its second {ends[1].words}: no period holds between. "
+        "Allowed: parameters that leave the ratio of the speeds as it is."
     )
 
 

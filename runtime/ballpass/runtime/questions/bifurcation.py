@@ -226,7 +226,7 @@ def bifurcation(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
-    step_of, every, forced = _strobe(model, {**overrides, chosen.name: chosen.low})
+    step_of, every, forced = _strobe(model, overrides, chosen)
     with shown("following motions", progress) as tell:
         done = [0]
 
@@ -264,24 +264,25 @@ def bifurcation(
 
 
 def _strobe(
-    model: AnyModel, parameters: Mapping[str, float]
+    model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange
 ) -> tuple[Callable[[Mapping[str, float]], float], str, bool]:
     """Time between readings as a function of overrides, words for it, and whether it is a period of the equations."""
-    from ballpass.runtime.ask.forcing_period import forcing_period
+    from ballpass.runtime.ask.forcing_period import common_period
 
-    turn = model.period(parameters)
+    first = {**parameters, vary.name: vary.low}
+    turn = model.period(first)
     if not math.isfinite(turn):
         raise RequestError("bifurcation: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     run = model.simulate(
-        duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=parameters, outputs=[], progress=False
+        duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=first, outputs=[], progress=False
     )
     try:
-        period = forcing_period(model, model.numbers(parameters), run.t, run.x, None)
+        period = common_period(model, parameters, vary, run.t, run.x)
     except RequestError:  # no common period: readings are taken each turn, and the report says so
         period = None
-    if period is not None and period.time(model.numbers(parameters).values) <= LONGEST_STROBE * turn:
+    if period is not None and period.time(model.numbers(first).values) <= LONGEST_STROBE * turn:
         return (lambda given: period.time(model.numbers(given).values)), f"each time {period.words}", True
-    return model.period, "once a turn, after which balls are elsewhere", False
+    return model.period, "once a turn, after which balls or loads are elsewhere", False
 
 
 def _motion(

@@ -281,7 +281,7 @@ def steady(
     ('inner.x', (8,))
     """
     from ballpass.runtime.ask.contact_sequence import contact_sequence
-    from ballpass.runtime.ask.forcing_period import forcing_period, refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import common_period, forcing_period, refuse_free_driver
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
@@ -296,10 +296,12 @@ def steady(
     with shown("shooting", progress) as tell:
         sampled = _transient(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
         pick = np.linspace(0, len(sampled.t) - 1, MOMENTS).astype(int)
-        period = forcing_period(model, numbers, sampled.t[pick], sampled.x[pick], turns)
+        moments = sampled.t[pick], sampled.x[pick]
+        if ends is None or turns is not None:
+            period = forcing_period(model, numbers, *moments, turns)
+        else:
+            period = common_period(model, given, ends, *moments)
         length = period.time(numbers.values)
-        if ends is not None:
-            _same_structure(model, {**given, ends.name: ends.high}, sampled, pick, period, turns)
         shooting = Shooting(
             model=model,
             parameters=given,
@@ -421,25 +423,6 @@ def _kicked(shooting: Shooting, found: PeriodicState) -> PeriodicState | None:
         if _sooner(shooting, other) == shooting.repeats:
             return other
     return None
-
-
-def _same_structure(
-    model: AnyModel,
-    parameters: Mapping[str, float],
-    sampled: Solution,
-    pick: np.ndarray,
-    period: ForcingPeriod,
-    turns: float | None,
-) -> None:
-    """Refuse a range over which the period is not that of the same turns."""
-    from ballpass.runtime.ask.forcing_period import forcing_period
-
-    other = forcing_period(model, model.numbers(parameters), sampled.t[pick], sampled.x[pick], turns)
-    if (other.rate, other.count) != (period.rate, period.count):
-        raise RequestError(
-            f"over: at its first end {period.words}, at its second {other.words}: no period holds between. Allowed: "
-            "parameters that leave the ratio of the speeds as it is."
-        )
 
 
 def _branches(
