@@ -16,6 +16,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
@@ -29,8 +30,8 @@ LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
 #: Accelerations at one state a period apart, relative to the largest, that are the same [1].
 SAME = 1e-6
 
-#: Where in a range a period is compared beside its ends: the golden section, at which no ratio of speeds is one of small
-#: numbers because it is so at both ends [1].
+#: Where in a range a period is compared beside its ends: the golden section, at which no ratio of speeds is one of
+#: small numbers because it is so at both ends [1].
 WITHIN_RANGE = 0.5 * (3.0 - math.sqrt(5.0))
 
 #: Change of a phase that shows whether the equations depend on it [rad].

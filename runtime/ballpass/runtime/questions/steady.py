@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.contact_sequence import ContactSequence
     from ballpass.runtime.ask.continuation import SteadyBranch
-    from ballpass.runtime.ask.forcing_period import ForcingPeriod
     from ballpass.runtime.ask.parameter_range import ParameterRange
     from ballpass.runtime.ask.shooting import PeriodicState, Shooting
     from ballpass.runtime.run.solution import Solution
