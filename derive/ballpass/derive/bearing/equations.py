@@ -109,7 +109,8 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     numbers = {q.path.rpartition(".")[2]: symbol_of(q) for q in bearing.damping.numbers}
     coefficient = law.coefficient(numbers, stiffness)
     if coefficient != 0:
-        constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
+        words = law.words.replace("a ball", f"a {ELEMENTS[bearing.element].noun}")
+        constants.append(names.define(names.constant("c_b"), coefficient, law.unit, words, law.latex))
     coordinates = ring_coordinates(bearing)
     ball, parts = _ball(bearing, names, coordinates, cage)
     return BearingModel(
