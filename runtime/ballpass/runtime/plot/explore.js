@@ -6,6 +6,7 @@ const written = (value, digits = 6) => {
   const short = Number(value.toPrecision(digits)), size = Math.abs(short);
   return size && (size < 1e-3 || size >= 1e6) ? short.toExponential().replace("+", "") : String(short);
 };
+const printed = (unit) => unit.replace(/\bum\b/g, "\u00b5m").replaceAll("*", "\u00b7").replace(/\^2(?![.\d])/g, "\u00b2").replace(/\^3(?![.\d])/g, "\u00b3");
 const shownValue = (k) => written(values[k] / list[k].factor);
 const quantity = (k, digits = 12) => `${written(values[k] / list[k].factor, digits)}${list[k].unit && ` ${list[k].unit}`}`;
 const changed = (k) => values[k] !== own[k];
@@ -22,7 +23,7 @@ function makeRow(k) {
   element(row, "label", one.words, { for: `value${k}`, title: one.name });
   const range = element(row, "input", "", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": one.words });
   const field = element(row, "input", "", { type: "number", step: "any", id: `value${k}` });
-  element(row, "span", one.unit, { class: "unit" });
+  element(row, "span", printed(one.unit), { class: "unit" });
   const back = element(row, "button", "\u21ba", { type: "button", title: "back to the scene's number", "aria-label": `reset ${one.words}` });
   range.addEventListener("change", keepAddress); // not at every step of the slider: browsers limit how often
   range.addEventListener("input", () => change(k, fromSlider(one, range.value)));
@@ -244,6 +245,10 @@ function ask() {
   if (!busy) work();
 }
 
+// The table has the highest force of all steady turns, which need not be the last one.
+const highestDrawn = ({ bearings, peak }) => (bearings.length
+  ? `; highest ${bearings[0].noun} force there: ${written(highest(bearings.flatMap((one) => one.force.map((signal) => at(signal, peak)))), 5)} N` : "");
+
 async function work() {
   busy = true;
   while (wanted) {
@@ -268,7 +273,8 @@ async function work() {
       warned.forEach((words) => element(get("warned"), "p", `warning: ${words}`));
       const [first, second] = [solved - began, performance.now() - solved];
       set(get("took"), { "data-solve": first, "data-draw": second });
-      get("took").textContent = `Solved in ${first.toFixed(0)} ms, drawn in ${second.toFixed(0)} ms, all in this page.${drawn.turning ? ` Pictures show the last ${solver.shown > 1 ? `${solver.shown} turns` : "turn"}.` : ""}`;
+      const pictured = !drawn.turning ? "" : ` Pictures show the last ${solver.shown > 1 ? `${solver.shown} turns` : "turn"}${highestDrawn(drawn)}.`;
+      get("took").textContent = `Solved in ${first.toFixed(0)} ms, drawn in ${second.toFixed(0)} ms, all in this page.${pictured}`;
       get("fault").hidden = true;
       get("shown").classList.remove("waiting");
     } catch (fault) {

@@ -79,7 +79,8 @@ function drawLinkage(parts) {
         const far = gap / Math.hypot(right, down);
         return [at[0] + right * (far + half[0]), at[1] + down * (far + half[1]), ...half, 3];
       });
-      const costs = boxes.map(covered), best = costs.indexOf(Math.min(...costs));
+      // beyond the edge of the picture nobody reads them
+      const costs = boxes.map((box) => covered(box) + 2 * [0, 1].reduce((sum, axis) => sum + Math.max(0, Math.abs(box[axis]) + box[axis + 2] - 50), 0)), best = costs.indexOf(Math.min(...costs));
       if (costs[best] < costs[kept] - 0.5) kept = best; // words that jump at every step cannot be read
       full.push(boxes[kept]);
       set(label, { x: boxes[kept][0], y: boxes[kept][1] + 0.36 * size });
