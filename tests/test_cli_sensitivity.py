@@ -40,7 +40,7 @@ def test_the_report_is_printed_written_and_drawn(ballpass: Callable[..., Result]
     assert "verified" in result.stdout
     assert "peak_ball_force" in result.stdout
     assert "…" not in result.stdout
-    assert "N/(m/s^2)" in result.stdout
+    assert "N/(m/s²)" in result.stdout
     report = json.loads((folder / "out" / "sensitivity.json").read_text(encoding="utf-8"))
     assert report["verdicts"]["verified"] == 4
     for name in ("rms_inner_y", "peak_ball_force"):

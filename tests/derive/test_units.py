@@ -225,7 +225,7 @@ def test_refusals_name_the_kind_that_is_asked_for() -> None:
 @pytest.mark.parametrize("unit", sorted(set(KINDS) - {"1"}))
 def test_a_number_of_a_table_is_read_in_a_scene(unit: str) -> None:
     factor, shown = table_unit(unit)
-    assert "*" not in shown
+    assert not [sign for sign in ("*", "^2", "um") if sign in shown]
     assert parse_quantity(f"{factor!r} {shown}", unit) == pytest.approx(1.0, rel=1e-15)
 
 

@@ -28,10 +28,20 @@ def test_derivatives_by_parameters_with_long_names_fit_80_columns(press: Model) 
     assert row.split()[1] == "–"  # a parameter that is 0
 
 
-def test_modes_and_matrices_of_the_press_fit_80_columns_and_have_names(press: Model) -> None:
-    text = to_text(press.linearize()._report())
+@pytest.mark.parametrize(
+    ("scene", "state", "what"),
+    [
+        ("punching_press", "inner.y", "inner.y: inner ring, y"),
+        ("rotor_two_bearings", "free_end.inner.y", "free_end.inner.y: inner ring of free_end, y"),
+    ],
+)
+def test_modes_and_matrices_fit_80_columns_and_have_names(
+    make_model: Callable[..., Model], scene: str, state: str, what: str
+) -> None:
+    text = to_text(make_model(scene).linearize()._report())
     assert max(map(len, text.splitlines())) <= 80
-    assert all(word in text for word in ("natural", "damping", "stiffness", "mass"))
+    assert all(word in text for word in ("natural", "damping", "stiffness", "mass", state))
+    assert what in " ".join(text.split())
 
 
 def test_tables_of_states_fit_80_columns_and_say_what_the_states_are(make_model: Callable[..., Model]) -> None:

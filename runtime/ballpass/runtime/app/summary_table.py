@@ -29,7 +29,7 @@ ROUNDING = 1e-13
 
 #: Parts of the table's caption about the run, with their words.
 _RUN = {
-    "rtol": "rtol {}",
+    "rtol": "relative tolerance {}",
     "steps": "{} steps",
     "located_kinks": "{} kinks located",
     "wall_time": "integrated in {} s",

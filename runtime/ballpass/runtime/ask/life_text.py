@@ -102,12 +102,22 @@ class LifeReport(Reported):
             title=f"{self.title}: strength and life of its bearings",
             parts=[*(part for state in self.states for part in _state_parts(state))]
             + [part for life in self.duty for part in _duty_parts(life)]
-            + [f"  by {reading}: {words}" for reading, words in READINGS.items() if self.has_lives],
+            + self._meanings(),
             facts=facts,
             records=records,
             index=("state", "bearing", "reading"),
             warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
         )
+
+    def _meanings(self) -> _Parts:
+        """What the lives are, and the readings of the loads."""
+        if not self.has_lives:
+            return []
+        lives = "  Lives: what 90 % of such bearings reach. basic: from P alone (ISO 281); reference: from the load of "
+        lives += "every ball or roller (ISO 16281)"
+        if any(bearing.factor is not None for state in self.states for bearing in state.bearings):
+            lives += "; modified: with a factor a_ISO for oil film (viscosity ratio κ) and dirt (contamination e_C)"
+        return [f"{lives}.", *(f"  by {reading}: {words}" for reading, words in READINGS.items())]
 
     def __repr__(self) -> str:
         parts = []
@@ -163,8 +173,11 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         rows += [
             ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
             ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
-            ("its angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
-            (f"its distance from the {element.middle}", *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings)),
+            ("deepest wear, angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
+            (
+                f"deepest wear, distance from the {element.middle}",
+                *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings),
+            ),
         ]
     parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
@@ -184,7 +197,7 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         parts.append(f"  No rating life. {bearing.why_no_life}")
         return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
     lives = {
-        f"basic L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
+        f"basic L_10, equivalent load P {_force(bearing.equivalent_load)}": bearing.basic_life,
         **{f"reference L_10r {_by(reading, bearing.governing)}": life for reading, life in bearing.lives.items()},
     }
     if bearing.factor is not None:

@@ -366,7 +366,7 @@ def _farthest(report: SensitivityReport, route: str | None) -> str:
         and pair.check.disagreement
         and not (pair.is_nothing or _bounded(pair))
     ]
-    return f"; verified ones are within {max(apart):.0e} of themselves from {route}" if apart else ""
+    return f"; verified ones differ from {route} by at most {100.0 * max(apart):.0e} %" if apart else ""
 
 
 def _known(value: float, uncertainty: float) -> str:

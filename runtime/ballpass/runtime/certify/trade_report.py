@@ -90,7 +90,8 @@ class Trade(Reported):
             wrapped=heads[-1:],
             caption="\n".join(
                 [
-                    f"{self.members} members of {self.cycles:g} cycles",
+                    f"{self.members} members, scenes with other numbers, of {self.cycles:g} turns each",
+                    "way: method and its relative tolerance (rtol); kinks located: steps end where a contact opens",
                     *(f"{name}: {words}" for name, words in self.meanings.items()),
                 ]
             ),
@@ -153,7 +154,7 @@ def _located(trade: Trade) -> list[str]:
     longer = sorted(one.time / plain.time for one, plain in pairs)[len(pairs) // 2]
     one, plain = min(pairs, key=lambda pair: pair[0].way.rtol)
     return [
-        f"Ending steps on the kinks of the laws takes {longer:.2g} of the time at the same tolerance; at "
+        f"Ending steps on the kinks of the laws takes {longer:.2g} times the time at the same tolerance; at "
         f"{one.way.method}, rtol {one.way.rtol:g}, the worst error is {percent(trade.error(one))}, without "
         f"{percent(trade.error(plain))}."
     ]

@@ -107,8 +107,10 @@ def table_unit(unit: str) -> tuple[float, str]:
 
 
 def printed_unit(unit: str) -> str:
-    """A unit of a scene, a request or a file as tables write it: N·s/m for N*s/m."""
-    return unit.replace("*", "·")
+    """A unit of a scene, a request or a file as tables and figures write it: N·s/m for N*s/m, m/s², µm."""
+    for plain, sign in ((r"\*", "·"), (r"\^2(?![.\d])", "²"), (r"\^3(?![.\d])", "³"), (r"\bum\b", "µm")):
+        unit = re.sub(plain, sign, unit)
+    return unit
 
 
 def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> float:

@@ -22,6 +22,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.units import printed_unit
+
 #: 1200 pixels wide.
 DPI = 150
 WIDTH = 8.0
@@ -177,11 +179,8 @@ def label(words: str, unit: str) -> str:
 
 
 def unit_words(unit: str) -> str:
-    """A unit as it is printed: m/s², N·m, µm."""
-    unit = {"um": "µm", "deg": "°"}.get(unit, unit)
-    for plain, sign in (("*", "·"), ("^2", "²"), ("^3", "³")):
-        unit = unit.replace(plain, sign)
-    return unit
+    """A unit beside an axis: m/s², N·m, µm, and ° for deg."""
+    return "°" if unit == "deg" else printed_unit(unit)
 
 
 def log_ticks(axis: Axis) -> None:

@@ -29,12 +29,16 @@ from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.report.short_words import head_lines, names_in_words
 from ballpass.runtime.run.magnitudes import mass_matrix
 
 Array = NDArray[np.float64]
 
 #: Eigenvalues below this fraction of the largest are zero but for rounding [1].
 RIGID = 1e-7
+
+#: Entries of a matrix below this fraction of its largest are zero but for rounding [1].
+ROUNDING = 1e-14
 
 #: How much faster than any ball's deflection changes at rest a vibration is whose balls all change sides [1].
 FASTER = 1e3
@@ -80,7 +84,7 @@ class Linearization(Reported):
 
     Attributes
     ----------
-    coordinates : names of the positions
+    coordinates, descriptions : names of the positions, and what each is
     mass : M, shape (coordinates, coordinates) [kg]
     damping : C, same shape [N*s/m]
     stiffness : K, same shape [N/m]
@@ -102,6 +106,7 @@ class Linearization(Reported):
     """
 
     coordinates: tuple[str, ...]
+    descriptions: tuple[str, ...]
     mass: Array
     damping: Array
     stiffness: Array
@@ -219,6 +224,7 @@ def linearize(
         warnings.warn(f"linearize: {note}", KinkWarning, stacklevel=3)
     return Linearization(
         coordinates=model.states[:half],
+        descriptions=tuple(state.description for state in model.manifest.states[:half]),
         mass=mass,
         damping=damping,
         stiffness=stiffness,
@@ -344,7 +350,8 @@ _FREQUENCIES = ("natural\n[Hz]", "damped\n[Hz]", "damping\nratio")
 def _modes_table(result: Linearization) -> ReportTable:
     where = "static equilibrium" if result.at_equilibrium else "given state"
     words = "Damping ratio: over critical damping. Shapes: size and phase of each coordinate, the largest 1."
-    heads = (*_FREQUENCIES, *result.coordinates)
+    coordinates = names_in_words(dict(zip(result.coordinates, result.descriptions, strict=True)))
+    heads = (*_FREQUENCIES, *map(head_lines, result.coordinates))
     rows = [
         (
             f"{mode.natural_frequency:.6g}",
@@ -359,7 +366,7 @@ def _modes_table(result: Linearization) -> ReportTable:
         heads=heads,
         rows=rows,
         right=heads,
-        caption="\n".join((words, *result.notes)),
+        caption="\n".join((words, coordinates, *result.notes)),
     )
 
 
@@ -391,8 +398,14 @@ def _matrices_table(result: Linearization) -> ReportTable:
         (("stiffness", "[N/m]"), result.stiffness),
     )
     rows = [
-        (words[k] if k < 2 else "", name, *(f"{value:z.5g}" for value in row))
+        (words[k] if k < 2 else "", name, *(_entry(value, float(np.max(np.abs(matrix)))) for value in row))
         for words, matrix in matrices
         for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True))
     ]
-    return ReportTable(heads=("matrix", "row", *result.coordinates), rows=rows, right=result.coordinates)
+    heads = tuple(map(head_lines, result.coordinates))
+    return ReportTable(heads=("matrix", "row", *heads), rows=rows, right=heads)
+
+
+def _entry(value: float, largest: float) -> str:
+    """An entry of a matrix; what rounding leaves beside the largest one is zero."""
+    return "0" if abs(value) <= ROUNDING * largest else f"{value:.5g}"

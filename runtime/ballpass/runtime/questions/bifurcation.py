@@ -129,6 +129,11 @@ class Bifurcation(ShortRepr, Reported):
             rows=[row[:shown] for row in rows],
         )
         said = []
+        if shown == 4:
+            said.append(
+                "Largest exponent, of Lyapunov: the logarithm of how much a small disturbance grows from one reading "
+                "to the next. Below zero it dies out; above zero the motion is chaotic."
+            )
         if self.apart:
             found = ", ".join(f"{value / factor:.6g}" for value in self.apart[:8])
             more = f" and {len(self.apart) - 8} more" if len(self.apart) > 8 else ""

@@ -160,6 +160,8 @@ class Optimum(ShortRepr, Reported):
             right=("value",),
         )
         said = []
+        if any(self.bounds):
+            said.append("held by: the end of the given range at which the least value lies; beyond it, it is smaller")
         for limit in self.limits:
             its, its_unit = table_unit(limit.unit)
             multiplier = f"active, multiplier {limit.multiplier * factor / its:.4g} {unit}/({its_unit})"

@@ -19,6 +19,7 @@ from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.report.short_words import short_words
@@ -115,7 +116,7 @@ class PoincareSection(ShortRepr, Reported):
                     f"{factor * column.min():z.6g}",
                     f"{factor * column.max():z.6g}",
                     shown_unit,
-                    *((f"{100.0 * share:.2g} %",) if fitted else ()),
+                    *((f"{rounded(100.0 * share, 2)} %",) if fitted else ()),
                     short_words(description),
                 )
                 for name, (factor, shown_unit), column, share, description in zip(
@@ -134,9 +135,10 @@ class PoincareSection(ShortRepr, Reported):
         if self.curve is not None:
             drift = self.curve.drift
             around = f", so that they go round once in {1.0 / abs(drift):.4g} turns" if drift else ""
+            harmonics = "1 harmonic" if self.curve.harmonics == 1 else f"{self.curve.harmonics} harmonics"
             parts.append(
                 f"From turn to turn the balls move by {drift:.6g} of a ball pitch beyond whole pitches{around}. The "
-                f"curve has {self.curve.harmonics} harmonics, fitted to every second point; off curve: how far "
+                f"curve has {harmonics}, fitted to every second point; off curve: how far "
                 "the others are from it, in shares of the points' spread."
             )
         if self.kind == "on a closed curve":

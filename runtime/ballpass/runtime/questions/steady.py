@@ -150,6 +150,12 @@ class SteadyState(ShortRepr, Reported):
 
         return kind_of(self.multipliers)
 
+    def _grows(self) -> str:
+        largest = abs(self.multipliers[0])
+        if largest <= self.resolution:
+            return f"dies out: less than {self.resolution:.0e} of it is left"
+        return f"becomes {largest:.4g} times as large"
+
     def _report(self) -> Report:
         from ballpass.runtime.ask.steady_report import (
             branch_facts,
@@ -188,8 +194,7 @@ class SteadyState(ShortRepr, Reported):
         listed = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
         listed += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
         parts: list[str | ReportTable] = [
-            f"{self.kind[0].upper()}{self.kind[1:]}: in a period a small disturbance becomes "
-            f"{abs(self.multipliers[0]):.4g} times as large.",
+            f"{self.kind[0].upper()}{self.kind[1:]}: in a period a small disturbance {self._grows()}.",
             f"In a period {self.forcing}.",
             table,
             f"Floquet multipliers, a factor of the disturbance a period for each direction: {listed}",

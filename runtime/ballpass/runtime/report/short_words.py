@@ -1,8 +1,12 @@
-"""Descriptions of a manifest, shortened for a column of a table."""
+"""Descriptions and names of a manifest, shortened for a column of a table."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+
+#: Characters of a column's head in one line.
+HEAD = 13
 
 #: What shortens a description, in this order.
 _SHORTER = (
@@ -28,3 +32,29 @@ def short_words(description: str) -> str:
     for pattern, short in _SHORTER:
         description = re.sub(pattern, short, description)
     return description[:1].upper() + description[1:]
+
+
+def names_in_words(described: Mapping[str, str]) -> str:
+    """Names of a table and what each is, as one sentence below it.
+
+    Examples
+    --------
+    >>> names_in_words({"inner.x": "Position of the centre of the inner ring along x"})
+    'inner.x: inner ring, x'
+    """
+    words = ((name, short_words(description)) for name, description in described.items())
+    return "; ".join(f"{name}: {short[:1].lower()}{short[1:]}" for name, short in words)
+
+
+def head_lines(name: str) -> str:
+    """A long name in several lines, broken behind its signs, as the head of a column.
+
+    Examples
+    --------
+    >>> head_lines("free_end.inner.x")
+    'free_end.\ninner.x'
+    """
+    lines = [""]
+    for part in re.split(r"(?<=[._:])", name):
+        lines = [*lines[:-1], lines[-1] + part] if len(lines[-1] + part) <= HEAD else [*lines, part]
+    return "\n".join(filter(None, lines))

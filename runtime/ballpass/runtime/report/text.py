@@ -1,7 +1,7 @@
 """A report as text of 80 columns, or as wide as the terminal: one style, names and numbers always whole.
 
-A name or a number is never cut or broken.  A table wider than the terminal is printed in blocks of columns below each
-other, the first columns in each; elsewhere, as in a pipe or a file, it is as wide as it must be.
+A name or a number is never cut or broken.  A table wider than that is printed in blocks of columns below each other,
+the first columns in each.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _print_table(table: ReportTable, console: Console) -> None:
     if table.title:
         console.print(Text(table.title, style="italic"), highlight=False)
     for block in _blocks(table, console):
-        # wider only where a block cannot be narrower, or where there is no terminal to wrap it
+        # wider only where a block cannot be narrower
         console.width = max(width, _least_width(block))
         console.print(block, highlight=False)
         console.width = width
@@ -80,7 +80,7 @@ def _blocks(table: ReportTable, console: Console) -> Iterator[Table]:
     chosen = list(columns[:names])
     for column in columns[names:]:
         wider = _of_columns(table, [*chosen, column])
-        if console.is_terminal and len(chosen) > names and _least_width(wider) > console.width:
+        if len(chosen) > names and _least_width(wider) > console.width:
             yield _of_columns(table, chosen)
             chosen = list(columns[:names])
         chosen = [*chosen, column]

@@ -182,7 +182,7 @@ def _modelled(report: dict[str, Any]) -> ReportTable:
         name = (
             part["name"]
             if rest is None
-            else f"rest: {part['name'].partition(' of ')[0]} and rings{' of all' if several else ''}"
+            else f"the rest: {part['name'].partition(' of ')[0]} and rings{' of all' if several else ''}"
         )
         added = rest if counts is None else counts.get("rhs", 0)
         cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"

@@ -21,15 +21,13 @@ from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
+from ballpass.runtime.report.short_words import head_lines
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.many.ensemble import EnsembleResult
-
-#: Characters of a column's head in one line.
-HEAD = 13
 
 #: Files of a sweep, beside a figure for each quantity.
 TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
@@ -244,8 +242,5 @@ class Sweep:
 
 
 def _head(name: str, unit: str) -> str:
-    """A column's head: a long name in several lines, broken behind its signs, the unit in a line of its own."""
-    lines = [""]
-    for part in re.split(r"(?<=[._:])", name):
-        lines = [*lines[:-1], lines[-1] + part] if len(lines[-1] + part) <= HEAD else [*lines, part]
-    return "\n".join([*filter(None, lines), f"[{unit}]"])
+    """A column's head, the unit in a line of its own."""
+    return f"{head_lines(name)}\n[{unit}]"
