@@ -52,6 +52,15 @@ def test_parts_are_counted_whose_outputs_nobody_could_ask_for_without_them(scene
     assert alone["rhs"] == added["mechanism"]["rhs"] > 0
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["punching_press_motor", "punching_press_two_way"])
+def test_what_is_left_of_a_machine_without_one_of_its_parts_is_a_scene(name: str) -> None:
+    """Without its coupling that of a motor had no equations, and explain ended in an error of Python."""
+    scene = read_scene(ROOT / f"scenes/{name}.toml")
+    added = cost(scene).added
+    assert ("coupling" in added) is (name == "punching_press_two_way")
+
+
 def test_a_ball_more_costs_nothing_in_the_steppers_text() -> None:
     scene = read_scene(ROOT / "scenes/punching_press.toml")
     (bearing,) = scene.bearings

@@ -227,6 +227,18 @@ def test_the_load_of_an_outer_ring_that_moves_is_what_the_balls_push_back(make_v
     assert np.max(np.hypot(*(np.abs(push) - np.abs(reaction)).T)) > 100.0
 
 
+@pytest.mark.long
+def test_one_way_the_ring_is_loaded_by_the_joint_at_any_speed(make_virtual: Callable[..., Model]) -> None:
+    """By a table of speeds too, where the rings' mean speed is written as that of a two-way bearing."""
+    table = 'start_angle = "0 deg"\n[mechanism.driver.table]\ntime = ["0 s", "1 s"]\nspeed = ["500 rpm", "600 rpm"]\n#'
+    model = make_virtual("punching_press", ('speed = "500 rpm"', ""), ('start_angle = "0 deg"', table))
+    record = gather(model, model.simulate(duration=0.01, transient=0))
+    load, reaction = record.ring_load(), record.values("reaction.A.x")
+    assert load is not None
+    assert load[:, 0] == pytest.approx(0.5 * reaction, rel=1e-9)
+    assert "is loaded one-way" in " ".join(model.explain().limits)
+
+
 def test_an_axially_preloaded_bearing_is_drawn_with_the_gap_that_is_left(make_virtual: Callable[..., Model]) -> None:
     """Its clearance was drawn, of which an axial displacement leaves a preload."""
     model = make_virtual("rotor", ("[bearing.damping]", 'axial_displacement = "0.08 mm"\n\n[bearing.damping]'))

@@ -266,6 +266,8 @@ def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
     mechanism = scene.mechanism
     assert mechanism is not None  # what the bearing is coupled with
     joint = mechanism.joint(mechanism.driver.joint)
+    if mechanism.driver.torque is not None:  # loads of bearings follow from a speed that is known
+        return None
     if len(scene.bearings) > 1 or bearing.joint != joint.name or bearing.inner_body != joint.other(FRAME):
         return None
     share = SceneNumber(

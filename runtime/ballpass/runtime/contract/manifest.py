@@ -277,11 +277,6 @@ class BearingInfo:
     inner_turns: str = ""
     alignment: AlignmentInfo | None = None
 
-    @property
-    def moves_linkage(self) -> bool:
-        """Whether bearing and linkage move each other: coupled two-way."""
-        return self.ring_speed.startswith(f"{self.path}.")
-
     def stands_inside(self, values: Mapping[str, Any]) -> Any:
         """Whether the inner ring makes no whole turns at these parameters and constants, numbers or arrays."""
         return values[self.inner_turns] == 0.0 if self.inner_turns else self.inner_stands

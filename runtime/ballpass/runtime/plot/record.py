@@ -18,7 +18,7 @@ from ballpass.runtime.contract.manifest import force_components, table_direction
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
-from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap, rated_element
+from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles, ball_angles_along
 
@@ -219,7 +219,7 @@ class Record:
         if bearing is None or not self.loaded_by_joint:
             return None
         # two-way the reaction is that of the housing, which moves an outer ring of its own as well
-        if bearing.moves_linkage and bearing.outer_ring:
+        if bearing.outer_ring and inner_ring_mass(bearing, self._values) is None:
             return self._force_on_balls() if self.has("ball.force") else None
         names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
         if not self.has(*names):

@@ -19,7 +19,7 @@ from ballpass.runtime.export.web_assembly import drawn_columns
 from ballpass.runtime.native.reduction_rows import DEFLECTION, HEAD, SECTORS, reduction_rows
 from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
-from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.ratings.of_bearing import inner_ring_mass, rated_element
 from ballpass.runtime.ratings.result_limits import FLATTENED, MOST_DEFLECTION, limit_templates
 
 
@@ -139,7 +139,7 @@ def _bearing(
     load: dict[str, Any] | None = None
     if pair(own("load")) is not None:
         load = {"columns": pair(own("load")), "sign": 1, "share": None, "count": None}
-    elif record.loaded_by_joint and bearing.moves_linkage and bearing.outer_ring:  # as `Record.ring_load`
+    elif record.loaded_by_joint and bearing.outer_ring and inner_ring_mass(bearing, place) is None:
         load = {"columns": None} if force.endswith("ball.force") else None
     elif record.loaded_by_joint and pair(f"reaction.{bearing.joint}") is not None:
         first = next(item[2] for item in record.mechanism.joints if item[0] == bearing.joint)

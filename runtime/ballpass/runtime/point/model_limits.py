@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.ratings.of_bearing import inner_ring_mass
 
 _BODY, _MASS = "mechanism.bodies.", ".mass"
 
@@ -40,8 +41,8 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
         return
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
     for bearing in manifest.bearings:
-        ring = values.get(f"{bearing.path}.m_ei", values.get(f"{bearing.path}.inner_ring.mass", 0.0))
-        if bearing.joint and not bearing.moves_linkage and linkage > ring:
+        ring = inner_ring_mass(bearing, values)
+        if bearing.joint and ring is not None and linkage > ring:
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
                 f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "

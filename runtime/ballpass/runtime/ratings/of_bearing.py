@@ -102,6 +102,11 @@ def contact_cosine(bearing: BearingInfo, values: Mapping[str, Any]) -> Any:
     return values.get(f"{bearing.path}.cos_contact_angle", 1.0)
 
 
+def inner_ring_mass(bearing: BearingInfo, values: Mapping[str, float]) -> float | None:
+    """Mass with which an inner ring moves on its own [kg]; None where it moves with its body: coupled two-way."""
+    return values.get(f"{bearing.path}.m_ei", values.get(f"{bearing.path}.inner_ring.mass"))
+
+
 def radial_gap(bearing: BearingInfo, values: Mapping[str, float]) -> float:
     """How far the inner ring moves until a ball is in contact [m]; `values` with derived constants."""
     return values.get(f"{bearing.path}.radial_gap", 0.5 * values[f"{bearing.path}.clearance"])
