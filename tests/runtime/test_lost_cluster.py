@@ -62,12 +62,11 @@ def test_a_worker_without_a_compiler_says_which_it_is(
     make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     packed = cluster.pack(make_model("rotor"))
-    workshop = cluster._Workshop()
-    workshop.take([packed])
+    cluster._receive([packed])
     worker = f"The worker on {socket.gethostname()}, process {os.getpid()}"
     monkeypatch.setenv("CC", "/no/such/cc")  # which did not say that it is a worker's
     with pytest.raises(RequestError, match=f"{worker}: the environment variable CC names '/no/such/cc'"):
-        workshop.model(packed.key)
+        cluster.loaded(packed.key)
     monkeypatch.setattr("ballpass.runtime.native.compilers.find_compiler", lambda command=None: None)
     with pytest.raises(RequestError, match=f"{worker}: it needs a C compiler"):
-        workshop.model(packed.key)
+        cluster.loaded(packed.key)

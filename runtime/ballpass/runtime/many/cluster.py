@@ -17,10 +17,10 @@ import os
 import shutil
 import socket
 import tempfile
-import threading
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -77,53 +77,34 @@ def pack(model: LoadedModel) -> Packed:
     return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=__version__)
 
 
-class _Workshop:
-    """Models of this process by the keys of their folders, each unpacked and compiled when first asked for."""
-
-    def __init__(self) -> None:
-        self._packed: dict[str, Packed] = {}
-        self._models: dict[str, LoadedModel] = {}
-        self._making = threading.Lock()
-
-    def take(self, packed: Sequence[Packed]) -> None:
-        self._packed.update((one.key, one) for one in packed)
-
-    def model(self, key: str) -> LoadedModel:
-        with self._making:
-            if key not in self._models:
-                self._models[key] = self._load(self._packed[key])
-            return self._models[key]
-
-    def _load(self, packed: Packed) -> LoadedModel:
-        here = __version__
-        if packed.version != here:
-            raise RequestError(
-                f"A worker has ballpass {here}, and {packed.version} sent it work. Install one version everywhere."
-            )
-        place = Path(tempfile.mkdtemp(prefix="ballpass-"))
-        atexit.register(shutil.rmtree, place, ignore_errors=True)
-        with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:
-            archive.extractall(place)
-        manifest = read_artefact(place)
-        try:
-            need_compiler("it")
-            library = compile_model(place, manifest)
-        except (RequestError, CompileError) as fault:
-            where = f"The worker on {socket.gethostname()}, process {os.getpid()}"
-            raise type(fault)(f"{where}: {fault}") from fault
-        return LoadedModel(place, manifest, library)
+#: Folders that were sent to this process, by their keys.
+_received: dict[str, Packed] = {}
 
 
-_workshop = _Workshop()
-
-
+@cache
 def loaded(key: str) -> LoadedModel:
-    """On a worker: the model of a folder that was sent."""
-    return _workshop.model(key)
+    """On a worker: the model of a folder that was sent, unpacked and compiled when first asked for."""
+    packed = _received[key]
+    if packed.version != __version__:
+        raise RequestError(
+            f"A worker has ballpass {__version__}, and {packed.version} sent it work. Install one version everywhere."
+        )
+    place = Path(tempfile.mkdtemp(prefix="ballpass-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:
+        archive.extractall(place)
+    manifest = read_artefact(place)
+    try:
+        need_compiler("it")
+        library = compile_model(place, manifest)
+    except (RequestError, CompileError) as fault:
+        where = f"The worker on {socket.gethostname()}, process {os.getpid()}"
+        raise type(fault)(f"{where}: {fault}") from fault
+    return LoadedModel(place, manifest, library)
 
 
 def _receive(packed: Sequence[Packed]) -> None:
-    _workshop.take(packed)
+    _received.update((one.key, one) for one in packed)
 
 
 @contextlib.contextmanager
