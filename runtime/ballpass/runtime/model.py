@@ -16,6 +16,7 @@ from ballpass.runtime.certify.transient import find_transient
 from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.folder import read_artefact
+from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
@@ -711,12 +712,14 @@ class Model(PointModel, Questions):
         'explore.html'
         """
         from ballpass.runtime.export.web_assembly import check_compiler
-        from ballpass.runtime.plot.explore import write_exploration
+        from ballpass.runtime.plot.explore import explore_page
         from ballpass.runtime.plot.sliders import check_units
 
         check_units(self.manifest, units or {})
         check_compiler()
-        return write_exploration(self, self.simulate(), path, units=units)
+        target = Path(path)
+        replace_file(target, explore_page(self, self.simulate(), units=units).encode())
+        return target
 
     def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
         """Breakpoints, smoothness and time scales, and the method that suits them.

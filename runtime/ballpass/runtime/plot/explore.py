@@ -8,10 +8,8 @@ from __future__ import annotations
 import base64
 import gzip
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.export.web_assembly import web_assembly
 from ballpass.runtime.plot.animate import records_of
 from ballpass.runtime.plot.animation import choose_frames, to_plain
@@ -52,12 +50,3 @@ def explore_page(model: PointModel, solution: Solution, *, units: Mapping[str, s
         "scene": model.manifest.scene,
     }
     return page(numbers, "explore")
-
-
-def write_exploration(
-    model: PointModel, solution: Solution, path: str | Path, *, units: Mapping[str, str] | None = None
-) -> Path:
-    """Write the page into a file; parameters and errors as for `explore_page`."""
-    target = Path(path)
-    replace_file(target, explore_page(model, solution, units=units).encode())
-    return target
