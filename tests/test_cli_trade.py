@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
-from ballpass.runtime.app.commands.trade import read_error
+from ballpass.runtime.app.commands.run import relative_error
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "varying_compliance"
@@ -130,9 +130,7 @@ def test_an_error_that_nothing_keeps_is_refused_with_exit_code_1(ballpass: Calla
 
 
 def test_percent_signs_and_plain_numbers_mean_the_same() -> None:
-    assert read_error("1%", None, None) == read_error(" 1 % ", None, None) == 0.01
-    assert read_error("0.01", None, None) == 0.01
-    assert read_error(None, None, None) is None
+    assert relative_error("1%") == relative_error(" 1 % ") == relative_error("0.01") == 0.01
 
 
 def test_a_scene_without_a_bearing_has_nothing_to_trade(ballpass: Callable[..., Result], site: Path) -> None:

@@ -54,6 +54,7 @@ UNKNOWN: Mapping[str | None, tuple[str, ...]] = {
     "OUTPUT=COLUMN": ("inner.q=a",),
     "STATE": ("inner.q",),
     "NAME": ("left",),
+    "CHOICE": ("locate",),
     None: ("inner.q",),
 }
 
@@ -107,11 +108,11 @@ def said(command: str, scene: Path, given: Mapping[str, str]) -> str:
 
 def in_python(model: Model, command: str, given: Mapping[str, str]) -> str | None:
     """The message of the same request; None where it is for the command line alone."""
+    named: dict[str, Any] = {{"of": "observables"}.get(name, name): text for name, text in given.items()}
+    named.pop("vary", None)
     calls: dict[str, Callable[[], Any]] = {
-        "run": lambda: model.quantities(given["of"]) if "of" in given else model.simulate(method=given["method"]),
-        "sweep": lambda: model.simulate_many(
-            {"bearing.clearance": [1e-6]}, given.get("of", "rms:inner.y"), method=given.get("method")
-        ),
+        "run": lambda: model.quantities(given["of"]) if "of" in given else model.simulate(**given),
+        "sweep": lambda: model.simulate_many({"bearing.clearance": [1e-6]}, **{"observables": "rms:inner.y", **named}),
         "stream": lambda: model.stream("long.nc", sample_rate=1e3, outputs=[given["of"]]),
         "trade": lambda: measure_trade(model, [given["of"]]),
     }

@@ -122,6 +122,14 @@ def bearings(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
             bearing_named(manifest, text)
 
 
+def kinks(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
+    """What a run does at kinks."""
+    from ballpass.runtime.run.locating import check_kinks
+
+    for text in texts:
+        check_kinks(text)
+
+
 def methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Methods of all models, with a compiler and without one."""
     from ballpass.runtime.contract.method_registry import STEPPERS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -15,7 +16,6 @@ from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import (
     Stages,
     can_draw,
-    checked_kinks,
     command,
     load_model,
     note,
@@ -26,7 +26,7 @@ from ballpass.runtime.app.commands.shared import (
     size_words,
     warn,
 )
-from ballpass.runtime.app.commands.trade import read_error
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.options import (
     Cycles,
@@ -59,8 +59,30 @@ Method = Annotated[
     Option(words=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.", shown="NAME", names=option_names.methods),
 ]
 
+AtKinks = Annotated[
+    str | None,
+    Option(
+        words="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or located, "
+        "so that its steps end there. Default: located at tight tolerances of auto and stepper.",
+        shown="CHOICE",
+        names=option_names.kinks,
+    ),
+]
+
 #: Bytes of samples that are written without a remark.
 LARGE = 200_000_000
+
+
+def relative_error(text: str) -> float:
+    """A relative error from a text: 1%, 1 %, 0.01; RequestError for another."""
+    number, mark = text.strip().removesuffix("%").strip(), text.strip().endswith("%")
+    try:
+        value = float(number) / (100.0 if mark else 1.0)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise RequestError(f"{text!r} is not a relative error. Allowed: a number above 0 as 1% or 0.01.")
+    return value
 
 
 def run(
@@ -90,20 +112,14 @@ def run(
     set_: options.Settings = None,
     rtol: Rtol = None,
     method: Method = None,
-    kinks: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HOW",
-            help="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or "
-            "located, so that its steps end there. Default: located at tight tolerances of auto and stepper.",
-        ),
-    ] = None,
+    kinks: AtKinks = None,
     error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="E",
-            help="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
+        float | None,
+        Option(
+            words="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
             "the run is estimated.",
+            shown="E",
+            reader=relative_error,
         ),
     ] = None,
     of: Of = None,
@@ -135,8 +151,6 @@ def run(
         formats = read_formats(format_)
         asked = read_asked(scene, set_, duration, transient)
         start = _read_start(initial)
-        at_kinks = checked_kinks(kinks, method or asked.method, error)
-        target = read_error(error, method, rtol)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
         needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
@@ -158,11 +172,11 @@ def run(
             parameters=asked.overrides,
             method=method,
             rtol=rtol,
-            kinks=at_kinks,
+            kinks=cast("Kinks | None", kinks),
             sample_rate=sample_rate,
             progress=stages.fraction,
-            error=target,
-            of=of if target is not None else None,
+            error=error,
+            of=of if error is not None else None,
             initial=start,
         )
         if solution.nbytes > LARGE:

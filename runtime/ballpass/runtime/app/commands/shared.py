@@ -36,7 +36,6 @@ from ballpass.runtime.show.progress import silent
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
-    from ballpass.runtime.run.locating import Kinks
 
 errors_console = Console(stderr=True, emoji=False)  # A:B:N is not an emoji
 
@@ -269,14 +268,6 @@ def check_folder(folder: Path) -> None:
             f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
             "one that can be made. Give another: --out DIR."
         )
-
-
-def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> Kinks | None:
-    """What to do at kinks; impossible choices are refused before anything is derived or written."""
-    from ballpass.runtime.run.locating import check_located, refuse_with_error
-
-    refuse_with_error(kinks, error)
-    return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
 
 
 def read_own(

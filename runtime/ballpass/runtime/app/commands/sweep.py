@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -21,7 +21,6 @@ from ballpass.runtime.app.commands.load_scene import (
 )
 from ballpass.runtime.app.commands.shared import (
     can_draw,
-    checked_kinks,
     command,
     complain,
     load_model,
@@ -42,6 +41,7 @@ from ballpass.runtime.questions import option_names
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.runtime.contract.manifest import Manifest
+    from ballpass.runtime.run.locating import Kinks
 
 Of = Annotated[
     Sequence[str] | None,
@@ -56,6 +56,16 @@ Of = Annotated[
 Method = Annotated[
     str | None,
     Option(words="auto, or a stepper's name as in ballpass run.", shown="NAME", names=option_names.stepper_methods),
+]
+
+AtKinks = Annotated[
+    str | None,
+    Option(
+        words="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a time. "
+        "If not given, as in ballpass run: located at tight tolerances.",
+        shown="CHOICE",
+        names=option_names.kinks,
+    ),
 ]
 
 #: Most members that the terminal shows one by one; of more only the extremes.
@@ -85,14 +95,7 @@ def sweep(
     transient: Transient = None,
     rtol: Rtol = None,
     method: Method = None,
-    kinks: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HOW",
-            help="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a "
-            "time. If not given, as in ballpass run: located at tight tolerances.",
-        ),
-    ] = None,
+    kinks: AtKinks = None,
     growth: Annotated[
         bool | None,
         typer.Option(
@@ -135,7 +138,6 @@ def sweep(
             read, source, overrides = read_with_settings(scene, set_, duration, transient)
             usual = read.run.method
         ranges = read_ranges(source, vary or [], overrides)
-        at_kinks = checked_kinks(kinks, method or usual)
         folder = results_folder(out, scene)
         figures, formats = figures and can_draw(), read_formats(format_)
         varied = grid(ranges)
@@ -146,7 +148,7 @@ def sweep(
                 scene,
                 stages,
                 method or usual,
-                at_kinks,
+                kinks,
                 rtol,
                 overrides=overrides,
                 needs="ballpass sweep",
@@ -163,7 +165,7 @@ def sweep(
                 transient=transient,
                 rtol=rtol,
                 method=method,
-                kinks=at_kinks,
+                kinks=cast("Kinks | None", kinks),
                 threads=threads,
                 growth=count <= TWINS if growth is None else growth,
                 client=client,

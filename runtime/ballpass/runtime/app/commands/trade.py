@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -98,27 +96,3 @@ def _simpler(scene: Path, against: str) -> Model:
     if against in ("one-way", "two-way"):
         return load(generate(read_scene(scene, coupling=cast("Coupling", against))))
     return load(against if Path(against).is_dir() else generate(against))
-
-
-def read_error(text: str | None, method: str | None, rtol: float | None) -> float | None:
-    """A relative error from a text: 1%, 1 %, 0.01.
-
-    Raises
-    ------
-    RequestError
-        The text is not an error, or a method or a tolerance is given as well.
-    """
-    if text is None:
-        return None
-    if method is not None or rtol is not None:
-        raise RequestError(
-            "--error chooses method and tolerance, and --method or --rtol was given as well. Give one or the other."
-        )
-    number, mark = text.strip().removesuffix("%").strip(), text.strip().endswith("%")
-    try:
-        value = float(number) / (100.0 if mark else 1.0)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise RequestError(f"--error: {text!r} is not a relative error. Allowed: a number above 0 as 1% or 0.01.")
-    return value
