@@ -101,6 +101,23 @@ def test_two_parameters_with_an_active_limit_against_a_fine_sweep(make_model: Ca
 
 
 @pytest.mark.long
+def test_a_limit_of_zero_holds_the_optimum_or_is_said_not_to_be_kept(make_model: Callable[..., Model]) -> None:
+    """The goal is the quantity itself, so that its multiplier is one."""
+    rotor, sideways = make_model("rotor"), "loads.weight.force.x"
+    asked = {"cycles": 12, "transient": 10, "starts": 1, "subject_to": "mean:inner.x >= 0 um"}
+    found = rotor.optimize("mean:inner.x", f"{sideways}=-30 N:20 N", **asked)
+    (limit,) = found.limits
+    assert limit.active
+    assert limit.multiplier == pytest.approx(1.0, rel=1e-6)
+    assert abs(found.value) < 1e-4 * abs(
+        rotor.quantities("mean:inner.y", cycles=12, transient=10)["mean:inner.y"].value
+    )
+    assert not found.report().fault
+    other = rotor.optimize("mean:inner.x", f"{sideways}=-30 N:-10 N", **asked)
+    assert "No values within the bounds keep the limit of mean:inner.x" in other.report().fault
+
+
+@pytest.mark.long
 def test_the_worst_within_a_tolerance_that_acts_one_way_is_at_its_end(make_model: Callable[..., Model]) -> None:
     """The motion grows with the clearance: least at 5 um, where the worst is that of 7 um."""
     press = make_model("punching_press")

@@ -24,6 +24,7 @@ class Limit:
     value : at the optimum [unit]
     active : whether it holds the optimum
     multiplier : change of the goal by that of the limit [goal's unit / unit]
+    beyond : how far the quantity is beyond the limit, as a share of it, or of what it is where the limit is zero [1]
     """
 
     quantity: str
@@ -33,16 +34,12 @@ class Limit:
     value: float = float("nan")
     active: bool = False
     multiplier: float = 0.0
+    beyond: float = float("nan")
 
     @property
     def sign(self) -> float:
         """1 for an upper limit, -1 for a lower one."""
         return 1.0 if self.upper else -1.0
-
-    @property
-    def beyond(self) -> float:
-        """How far the quantity is beyond the limit, as a share of it [1]."""
-        return self.sign * (self.value - self.limit) / max(abs(self.limit), 1e-300)
 
 
 def read_limits(manifest: Manifest, option: str, texts: Sequence[str]) -> list[Limit]:

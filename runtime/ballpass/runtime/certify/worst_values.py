@@ -85,8 +85,10 @@ class WorstValues:
         """Merits of points, which also give the sizes, shape (points,)."""
         (found,) = parts.once(shares, lambda: (self._lanes(np.array([self._rows(share) for share in shares])),))
         scaled = self._signs * (found[..., self._columns] - self._offsets)
-        sizes = [float(np.median(np.abs(found[..., 0]))), *(abs(one.limit) for one in self._limits)]
-        self.sizes = np.maximum(sizes, 1e-300)
+        seen = np.median(np.abs(found[..., self._columns]), axis=(0, 1))
+        # a limit of zero has no size of its own
+        limits = (abs(one.limit) or size for one, size in zip(self._limits, seen[1:].tolist(), strict=True))
+        self.sizes = np.maximum([seen[0], *limits], 1e-300)
         worst = (scaled / self.sizes).max(axis=1)
         return np.array([Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, worst, strict=True)])
 

@@ -332,6 +332,7 @@ def optimize(
                 one,
                 value=float(one.limit + one.sign * best.values[k] * sizes[k]),
                 active=bool(abs(best.values[k]) < ACTIVE),
+                beyond=float(best.values[k]),
                 multiplier=-float(one.sign * least.multipliers[k - 1] * sizes[0] / sizes[k]),
             )
             for k, one in enumerate(limits, start=1)
