@@ -66,3 +66,46 @@ def test_what_has_no_section_is_refused(press: Model, make_model: Callable[..., 
         press.section("inner.z")
     with pytest.raises(RequestError, match="driver's motion is a state"):
         make_model("punching_press_motor").section()
+
+
+@pytest.mark.long
+def test_where_a_ball_differs_the_curve_is_over_a_turn_of_the_cage_and_a_load_at_its_own_rate_leaves_none(
+    make_model: Callable[..., Model],
+) -> None:
+    load = """[loads.harmonic]
+type = "harmonic"
+mean = ["0 N", "0 N"]
+amplitude = ["0 N", "0 N"]
+frequency = "37 Hz"
+phase = "0 deg"
+
+[bearing.ball_deviation]
+3 = "1 um"
+
+[bearing]
+"""
+    rotor = make_model("rotor", ("[bearing]\n", load))
+    found = rotor.section(readings=1600, settling=60)
+    assert (found.kind, found.around) == ("on a closed curve", "turn of the cage")
+    assert found.curve is not None
+    times = rotor.period() * np.arange(60, 90)
+    start = np.array([1e-6, -4e-6, 0.0, 0.0])
+    run = rotor.simulate(duration=float(times[-1]), times=times, initial=start, outputs=[], transient=0.0)
+    turned = rotor.numbers().values["bearing.cage_ratio"] * np.arange(60, 90)
+    assert np.max(np.abs(found.curve(turned) - run.x) / found.states.std(axis=0)) < ON_CURVE
+    other = rotor.section(readings=40, settling=5, parameters={"loads.harmonic.amplitude.x": 5.0})
+    assert other.kind == "not named: loads.harmonic.angular_frequency turns at its own rate"
+    # of 50 Hz it repeats with the shaft
+    even = {"loads.harmonic.amplitude.x": 5.0, "loads.harmonic.frequency": 50.0}
+    assert rotor.section(readings=40, settling=5, parameters=even).curve is not None
+
+
+@pytest.mark.long
+def test_points_of_an_engine_are_taken_once_in_two_turns(make_model: Callable[..., Model]) -> None:
+    engine = make_model("engine")
+    found = engine.section(readings=1600, settling=60)
+    assert found.kind == "on a closed curve"
+    assert "1600 points, one in 2 turns" in str(found)
+    times = engine.period() * 2.0 * np.arange(61, 64)
+    run = engine.simulate(duration=float(times[-1]), times=times, outputs=[], transient=0.0, rtol=1e-8)
+    assert np.max(np.abs(found.states[:3] - run.x) / found.states.std(axis=0)) < 1e-3

@@ -152,6 +152,21 @@ def common_period(
     )
 
 
+def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
+    """What else turns than a bearing's cage and stands elsewhere after each time `every` [s], by its rate.
+
+    Parameters
+    ----------
+    times, states : as for `forcing_period`
+    """
+    found = []
+    for rate in _rates(model, numbers, times, states):
+        turns = abs(numbers.values[rate]) * every / driver_angle.TURN
+        if _alike(model, rate) == 1 and abs(turns - round(turns)) > EXACT * turns:
+            found.append(rate)
+    return found
+
+
 def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
     """Rates that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls."""
     found: dict[str, int] = {}

@@ -14,7 +14,7 @@ import numpy as np
 
 #: Harmonics that are tried; and points of the fit for each, at least: it has two numbers, and phases are not evenly
 #: spaced.
-TRIED, POINTS_EACH = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 3
+TRIED, POINTS_EACH = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512), 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

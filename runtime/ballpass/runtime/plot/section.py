@@ -22,6 +22,7 @@ ALONG = 1000
 def draw_section(
     states: np.ndarray,
     phase: np.ndarray,
+    around: str,
     names: Sequence[str],
     units: Sequence[str],
     row: int,
@@ -33,7 +34,7 @@ def draw_section(
     Parameters
     ----------
     states : points, shape (points, states)
-    phase : place of the balls, shape (points,) [ball pitch]
+    phase, around : place of the balls, shape (points,), and its unit
     names, units, row : of the states, and place of the one that is shown
     curve : None where there is none
     words : below the figure
@@ -58,7 +59,7 @@ def draw_section(
     section.locator_params("x", nbins=5)
     section.set_xlabel(label(names[place], shown[place]))
     section.set_ylabel(label(names[rate], shown[rate]))
-    over.set_xlabel(label("place of the balls", "ball pitch"))
+    over.set_xlabel(label("place of the balls", around))
     over.set_ylabel(label(names[place], shown[place]))
     figure.legend(*section.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption(figure, "Poincaré section", words)

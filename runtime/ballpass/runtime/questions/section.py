@@ -1,5 +1,7 @@
 """A Poincaré section of a long run: states once a turn, and the closed curve on which they lie where there is one.
 
+Of an engine, whose loads repeat after two turns, they are read once in two.
+
 Where drive and cage have no common period, no state repeats.  In a motion that attracts, the state at one angle of the
 driver is then a function of where the balls stand: a closed curve, which is fitted by a Fourier series.
 """
@@ -30,10 +32,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.invariant_curve import InvariantCurve
+    from ballpass.runtime.contract.parameters import Numbers
+    from ballpass.runtime.run.solution import Solution
 
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
 ON_CURVE = 0.02
+
+#: Rounds of a curve, and moments at which what turns is sought.
+PITCH, CAGE, MOMENTS = "ball pitch", "turn of the cage", 40
 
 Section = Annotated[int, Option(words="Turns of which a point is kept.", shown="N", least=40, most=1_000_000)]
 Dropped = Annotated[int, Option(words="Turns at the start that do not count.", shown="N", least=0, most=1_000_000)]
@@ -58,9 +65,12 @@ class PoincareSection(ShortRepr, Reported):
     row : of the state that is shown
     angle : of driver or shaft since t = 0 [deg]
     states : points, shape (readings, states)
-    phase : where the balls stand at each point, in ball pitches from 0 to 1, shape (readings,) [1]
+    turns : of driver or shaft from point to point: one, or as many as all loads repeat after
+    phase : where the balls stand at each point, in parts of `around` from 0 to 1, shape (readings,) [1]
+    around : what a round of the curve is: a ball pitch, or a turn of the cage where balls differ
     period : turns after which points repeat; 0 where they do not
-    curve : fitted over `phase`; None where points repeat, or where several cages turn
+    curve : fitted over `phase`; None where points repeat, or where more turns than one cage
+    others : what turns at a rate of its own besides
 
     Examples
     --------
@@ -75,9 +85,23 @@ class PoincareSection(ShortRepr, Reported):
     row: int
     angle: float
     states: np.ndarray
+    turns: int
     phase: np.ndarray
+    around: str
     period: int
     curve: InvariantCurve | None
+    others: tuple[str, ...]
+
+    @property
+    def often(self) -> str:
+        """How often a point is taken, in words.
+
+        Examples
+        --------
+        >>> model.section(readings=40).often
+        'one a turn'
+        """
+        return "one a turn" if self.turns == 1 else f"one in {self.turns} turns"
 
     @property
     def kind(self) -> str:
@@ -91,7 +115,10 @@ class PoincareSection(ShortRepr, Reported):
         if self.period:
             return f"repeats after {self.period} turn{'' if self.period == 1 else 's'}"
         if self.curve is None:
-            return "not named: several cages turn"
+            own = f"{' and '.join(self.others)} turn" + (
+                " at rates of their own" if self.others[1:] else "s at its own rate"
+            )
+            return f"not named: {own if self.others else 'several cages turn'}"
         return "on a closed curve" if np.max(self.curve.missed) <= ON_CURVE else "on no smooth curve"
 
     def _report(self) -> Report:
@@ -108,7 +135,7 @@ class PoincareSection(ShortRepr, Reported):
         ]
         fitted = self.curve is not None
         table = ReportTable(
-            title=f"{len(self.states)} points, one a turn, at {self.angle:g} deg: {self.kind}",
+            title=f"{len(self.states)} points, {self.often}, at {self.angle:g} deg: {self.kind}",
             heads=("state", "least", "largest", "unit", *(("off curve",) if fitted else ()), "what"),
             rows=[
                 (
@@ -134,10 +161,10 @@ class PoincareSection(ShortRepr, Reported):
         parts: list[str | ReportTable] = [table]
         if self.curve is not None:
             drift = self.curve.drift
-            around = f", so that they go round once in {1.0 / abs(drift):.4g} turns" if drift else ""
+            around = f", so that they go round once in {self.turns / abs(drift):.4g} turns" if drift else ""
             harmonics = "1 harmonic" if self.curve.harmonics == 1 else f"{self.curve.harmonics} harmonics"
             parts.append(
-                f"From turn to turn the balls move by {drift:.6g} of a ball pitch beyond whole pitches{around}. The "
+                f"From point to point the balls move by {drift:.6g} of a {self.around} beyond whole ones{around}. The "
                 f"curve has {harmonics}, fitted to every second point; off curve: how far "
                 "the others are from it, in shares of the points' spread."
             )
@@ -153,6 +180,9 @@ class PoincareSection(ShortRepr, Reported):
             )
         facts = {
             "angle": self.angle,
+            "turns": self.turns,
+            "around": self.around,
+            "others": list(self.others),
             "kind": self.kind,
             "period": self.period,
             "drift": self.curve.drift if self.curve is not None else None,
@@ -168,8 +198,9 @@ def _figures(_model: AnyModel, found: PoincareSection, _parameters: object) -> I
     from ballpass.runtime.plot.section import draw_section
 
     curve = found.curve if found.kind == "on a closed curve" else None
-    words = f"{len(found.states)} points, one a turn, {found.angle:g} degrees after t = 0: {found.kind}."
-    yield "section", draw_section(found.states, found.phase, found.names, found.units, found.row, curve, words)
+    words = f"{len(found.states)} points, {found.often}, {found.angle:g} degrees after t = 0: {found.kind}."
+    names = found.names, found.units, found.row
+    yield "section", draw_section(found.states, found.phase, found.around, *names, curve, words)
 
 
 @Question(stage="simulate", samples=True, figures=_figures)
@@ -186,9 +217,9 @@ def section(
 ) -> PoincareSection:
     """Take the Poincaré section of a long run, and fit the closed curve on which its points lie.
 
-    A state is read once a turn, always at the same angle. Points that repeat belong to a periodic motion, points on a
-    closed curve to a quasi-periodic one. The curve is a Fourier series over the place of the balls; every second point
-    is left out of the fit and judges it.
+    A state is read once a turn, always at the same angle; of an engine whose loads repeat after two turns, once in two.
+    Points that repeat belong to a periodic motion, points on a closed curve to a quasi-periodic one. The curve is a
+    Fourier series over the place of the balls; every second point is left out of the fit and judges it.
 
     Parameters
     ----------
@@ -212,16 +243,17 @@ def section(
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
     from ballpass.runtime.run.ball_angles import ball_angles
+    from ballpass.runtime.run.driver_angle import cycle_turns
 
     manifest = model.manifest
     refuse_free_driver(manifest, "section")
-    turn = model.period(parameters or {})
+    turn, numbers = model.period(parameters or {}), model.numbers(parameters or {})
     if not math.isfinite(turn):
         raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    angle = 0.0 if at is None else at
-    times = turn * (settling + angle / 360.0 + np.arange(1, readings + 1))
+    angle, turns = 0.0 if at is None else at, cycle_turns(numbers.values)
+    times = turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
     with shown("taking points", progress):
         run = model.simulate(
             duration=float(times[-1]),
@@ -232,13 +264,20 @@ def section(
             transient=0.0,
             progress=False,
         )
-    period = period_of(run.x, np.array(run.statistics.magnitudes))
-    numbers, phase, curve = model.numbers(parameters or {}), np.zeros(readings), None
+    period = turns * period_of(run.x, np.array(run.statistics.magnitudes))
+    phase, around, curve = np.zeros(readings), PITCH, None
+    others: tuple[str, ...] = ()
     if len(manifest.bearings) == 1:
+        others = _others(model, numbers, run, turns * turn)
         first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(run.t.tolist(), run.x, strict=True)]
-        pitches = np.array(first) * manifest.bearings[0].balls / math.tau
-        phase = pitches % 1.0
-        curve = None if period else fit_curve(pitches, run.x)
+        rounds = np.array(first) / math.tau
+        phase = rounds * manifest.bearings[0].balls
+        curve = None if period or others else fit_curve(phase, run.x)
+        if curve is not None and np.max(curve.missed) > ON_CURVE:
+            # where a ball differs, all balls are in their places again after a turn of the cage
+            whole = fit_curve(rounds, run.x)
+            if np.max(whole.missed) <= ON_CURVE:
+                phase, around, curve = rounds, CAGE, whole
     return PoincareSection(
         names=names,
         units=tuple(info.unit for info in manifest.states),
@@ -246,7 +285,21 @@ def section(
         row=names.index(state),
         angle=angle,
         states=run.x,
-        phase=phase,
+        turns=turns,
+        phase=phase % 1.0,
+        around=around,
         period=period,
         curve=curve,
+        others=others,
     )
+
+
+def _others(model: AnyModel, numbers: Numbers, run: Solution, every: float) -> tuple[str, ...]:
+    """What turns beside the cage and stands elsewhere at each point; none is named of a table over time."""
+    from ballpass.runtime.ask.forcing_period import own_phases
+
+    pick = np.linspace(0, len(run.t) - 1, MOMENTS).astype(int)
+    try:
+        return tuple(own_phases(model, numbers, run.t[pick], run.x[pick], every))
+    except RequestError:
+        return ()
