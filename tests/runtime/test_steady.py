@@ -177,6 +177,20 @@ def openings_and_closings(
 
 
 @pytest.mark.long
+def test_the_branch_of_the_press_goes_into_its_chaotic_region(make_model: Callable[..., Model]) -> None:
+    press = make_model("punching_press_tangent")
+    branch = press.steady(over="bearing.clearance=10 um:20.2 um", parameters=THREE_EIGHTHS).branches[0]
+    last = branch.points[-1]
+    assert branch.ended == "at the end of the range"
+    assert abs(last.multipliers[0]) > 10.0  # a state that repels
+    places = [round(point.value * 1e6, 2) for point in branch.special if point.value > 20.1e-6]
+    assert places[-7:] == [20.15, 20.15, 20.17, 20.18, 20.17, 20.17, 20.19]  # folds are passed, not jumped over
+    readings = press.bifurcation("bearing.clearance=20.19 um:20.2 um:2", parameters=THREE_EIGHTHS, readings=60).up[-1]
+    assert readings.exponent is not None
+    assert readings.exponent.low > 0.0  # beside it motion is chaotic
+
+
+@pytest.mark.long
 def test_the_contacts_of_the_press_are_those_of_its_sampled_ball_forces(make_model: Callable[..., Model]) -> None:
     press = make_model("punching_press_tangent")
     found = press.steady(parameters=THREE_EIGHTHS)

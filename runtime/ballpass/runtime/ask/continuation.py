@@ -3,8 +3,8 @@
 In: a `Shooting` with a varied parameter, a state to begin with, a range.  Out: a `SteadyBranch`.
 
 Unknown are the states at the segments' starts and the parameter.  Each step goes along the branch's tangent and comes
-back to the branch across it, so that folds are passed.  Where a function of the multipliers changes its sign between
-two points, the point between them is found by Brent's method along the step:
+back to the branch by the shortest way (Moore and Penrose), so that folds are passed.  Where a function of the
+multipliers changes its sign between two points, the point between them is found by Brent's method along the step:
 
 * fold: the parameter turns back;
 * branch point: a multiplier passes 1 and the parameter goes on;
@@ -27,7 +27,7 @@ from ballpass.runtime.ask.shooting import PeriodicState, Residual, Shooting
 from ballpass.runtime.contract.errors import SimulationError
 
 #: First, least and largest step, in shares of the range; most points; most iterations of a step.
-STEP, LEAST_STEP, LARGEST_STEP, POINTS, ITERATIONS = 0.01, 1e-6, 0.02, 400, 8
+STEP, LEAST_STEP, LARGEST_STEP, POINTS, ITERATIONS = 0.01, 1e-7, 0.02, 400, 4
 
 #: Done where the last step is below this share of magnitudes and range [1].
 CLOSE = 1e-8
@@ -35,8 +35,9 @@ CLOSE = 1e-8
 #: Points are located so closely, as a share of a step [1].
 LOCATED = 1e-9
 
-#: Least cosine of the angle between the branch's directions before and behind a step.
-BEND = 0.7
+#: Least cosine of the angles between a step and the branch's directions before and behind it: where they are wider, or
+#: iterations more, a step may end on another branch, or beyond a fold on this one, and is halved.
+BEND = 0.8
 
 #: Largest distance from the unit circle at which a complex pair is said to pass it [1].
 ON_CIRCLE = 1e-3
@@ -138,13 +139,14 @@ def follow(
         now = first if first.tangent[-1] > 0.0 else _turned(first)
     else:
         # beside a point at which branches cross the tangent is not unique: the one that is given leads away
-        now = path.corrected(y, tangent, ASIDE)
+        now = path.corrected(y, tangent, ASIDE, across=True)
     found = [path.point(now, "")]
     step, ended, apart = STEP, f"after {points} points", None
     for _ in range(points):
         try:
             then = path.corrected(now.y, now.tangent, step)
-            if then.tangent @ now.tangent < BEND:
+            along = (then.y - now.y) / np.linalg.norm(then.y - now.y)
+            if min(along @ now.tangent, along @ then.tangent, now.tangent @ then.tangent) < BEND:
                 raise SimulationError("steady: the branch bends too much within a step.")
         except SimulationError:
             step /= 2.0
@@ -169,7 +171,7 @@ def follow(
                 ended = "a step before the end of the range, at which no state was found"
             break
         found.append(path.point(then, ""))
-        step = min(step * (1.5 if then.iterations <= 3 else 0.7 if then.iterations > 5 else 1.0), LARGEST_STEP)
+        step = min(step * (1.5 if then.iterations <= 3 else 1.0), LARGEST_STEP)
         now = then
     return SteadyBranch(repeats=shooting.repeats, points=tuple(found), ended=ended)
 
@@ -222,8 +224,8 @@ class _Path:
         direction = np.asarray(np.linalg.svd(self.matrix(residual))[2][-1])
         return -direction if before is not None and direction @ before < 0.0 else direction
 
-    def corrected(self, y: np.ndarray, along: np.ndarray, step: float) -> _Found:
-        """The point of the branch in the plane across a direction, so far along it.
+    def corrected(self, y: np.ndarray, along: np.ndarray, step: float, *, across: bool = False) -> _Found:
+        """The point of the branch near to one that lies so far along a direction, or in the plane across it there.
 
         Raises
         ------
@@ -234,10 +236,11 @@ class _Path:
         now, before = aim.copy(), np.inf
         for iteration in range(1, ITERATIONS + 1):
             residual = self.shooting.residual(*self.states(now))
-            square = np.vstack([self.matrix(residual), along])
-            left = np.append(residual.left, along @ (now - aim))
+            matrix, left = self.matrix(residual), residual.left
+            if across:
+                matrix, left = np.vstack([matrix, along]), np.append(left, along @ (now - aim))
             try:
-                change = -np.linalg.solve(square, left)
+                change = -np.linalg.lstsq(matrix, left)[0]  # the smallest that leaves nothing
             except np.linalg.LinAlgError:
                 break
             size = float(np.max(np.abs(change)))
@@ -245,8 +248,7 @@ class _Path:
                 break
             now = now + change
             if size < CLOSE:
-                found = self.at(now, along)
-                return _Found(now, found.residual, found.tangent, iteration)
+                return _Found(now, residual, self.tangent(residual, along), iteration)
             before = size
         raise SimulationError("steady: no point of the branch was found across a step.")
 
@@ -262,7 +264,7 @@ class _Path:
         end = min(max(float(then.y[-1]), 0.0), 1.0)
         along = np.zeros(len(step))
         along[-1] = np.sign(step[-1])
-        return self.corrected(now.y + (end - now.y[-1]) / step[-1] * step, along, 0.0)
+        return self.corrected(now.y + (end - now.y[-1]) / step[-1] * step, along, 0.0, across=True)
 
     def point(self, found: _Found, kind: str) -> BranchPoint:
         nodes, value = self.states(found.y)

@@ -22,6 +22,9 @@ ON_CIRCLE = 1e-6
 #: Most changes of contacts of a branch that a table lists; JSON lists all.
 LISTED = 10
 
+#: So many special points within this share of the range are said to be crowded [1].
+CROWD, CROWDED = 8, 0.05
+
 
 def kind_of(multipliers: np.ndarray) -> str:
     """Stability in words."""
@@ -105,6 +108,23 @@ def branch_words(branch: SteadyBranch) -> str:
         return f"{words}; contacts of all: {branch.points[0].contacts.words}"
     shown = f", of which the table has the first {LISTED}" if changes > LISTED else ""
     return f"{words}; contacts change in {changes} of {len(branch.points) - 1} steps{shown}"
+
+
+def early_end(branch: SteadyBranch, over: ParameterRange) -> str:
+    """Why and where a branch ends within its range, and what crowds there."""
+    unit = printed_unit(over.shown_unit)
+    words = (
+        f"The branch ends {branch.ended}, at {branch.points[-1].value / over.factor:.6g} {unit}, and does not reach "
+        "the end of the range."
+    )
+    places = [point.value for point in branch.special][-CROWD:]
+    if len(places) < CROWD or np.ptp(places) > CROWDED * abs(over.high - over.low):
+        return words
+    return (
+        f"{words} It has {len(branch.special)} folds, doublings and other changes, and the last {CROWD} lie between "
+        f"{min(places) / over.factor:.6g} and {max(places) / over.factor:.6g} {unit}: branches wind so where motion is "
+        "chaotic. On which motion runs end there: ballpass bifurcation."
+    )
 
 
 def branch_facts(branch: SteadyBranch) -> dict[str, Any]:

@@ -323,7 +323,7 @@ def steady(
         if sooner == 1 < repeats and repeats % 2 == 0:
             kicked = _kicked(shooting, found)
             found, sooner = (found, sooner) if kicked is None else (kicked, _sooner(shooting, kicked))
-        branches, notes = ((), ()) if ends is None else _branches(shooting, found, (ends.low, ends.high), tell)
+        branches, notes = ((), ()) if ends is None else _branches(shooting, found, ends, tell)
     return SteadyState(
         states=tuple(info.name for info in manifest.states),
         units=tuple(info.unit for info in manifest.states),
@@ -430,15 +430,17 @@ def _kicked(shooting: Shooting, found: PeriodicState) -> PeriodicState | None:
 
 
 def _branches(
-    shooting: Shooting, found: PeriodicState, ends: tuple[float, float], tell: Callable[[float], None] | None
+    shooting: Shooting, found: PeriodicState, over: ParameterRange, tell: Callable[[float], None] | None
 ) -> tuple[tuple[SteadyBranch, ...], tuple[str, ...]]:
     """The branch of a state, and those of twice the period at its doublings, each once."""
     from ballpass.runtime.ask.continuation import LARGEST_STEP, doubled, follow
+    from ballpass.runtime.ask.steady_report import early_end
 
+    ends = (over.low, over.high)
     first = follow(shooting, found, ends[0], ends, progress=tell)
     branches, notes, met = [first], [], list[float]()
     if not first.ended.startswith("at the end"):
-        notes.append(f"The branch ends {first.ended}, and does not reach the end of the range.")
+        notes.append(early_end(first, over))
     for point in first.special:
         near = LARGEST_STEP * abs(ends[1] - ends[0])
         if point.kind != "period doubling" or any(abs(point.value - other) < near for other in met):
