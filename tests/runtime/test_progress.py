@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
+from ballpass.runtime.app.commands import shared
 from ballpass.runtime.many import ensemble
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.show import progress
@@ -91,6 +92,20 @@ def test_a_bar_can_be_turned_off_and_short_calls_show_none() -> None:
 def test_pipes_and_logs_get_nothing() -> None:
     child = subprocess.run([sys.executable, "-c", SCRIPT, "5"], capture_output=True, text=True, check=True)
     assert (child.stdout, child.stderr) == ("silent\ndone\n", "")
+
+
+def test_a_command_in_a_pipe_writes_how_far_a_long_stage_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(shared, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    with shared.Stages() as stages:
+        stages("simulate")
+        for second in range(1, 31):
+            now[0] = float(second)
+            stages.fraction(second / 40)
+    lines = [line.strip() for line in capsys.readouterr().err.splitlines()]
+    assert lines == ["0.0 s  simulating", *(f"{s}.0 s  simulating, {100 * s // 40} %" for s in (10, 20, 30))]
 
 
 def test_one_bar_shows_at_a_time() -> None:

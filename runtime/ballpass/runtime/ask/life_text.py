@@ -240,7 +240,8 @@ def _by(reading: str, governing: str) -> str:
 def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
     """Lives in turns and hours."""
     heads = ("life", "million turns", "hours")
-    return ReportTable(heads=heads, rows=[(name, *_life(*life)) for name, life in lives.items()], right=heads[1:])
+    rows = [(name, *_life(*life)) for name, life in lives.items()]
+    return ReportTable(heads=heads, rows=rows, right=heads[1:], wrapped=heads[:1])
 
 
 def _life(turns: float, spent: float) -> tuple[str, str]:

@@ -179,7 +179,9 @@ def run(
             of=of if error is not None else None,
             initial=start,
         )
-        if solution.nbytes > LARGE:
+        # nobody asked for the turns of a transient that ballpass chose: they are most of such a file
+        chosen = not model.manifest.run.stated and (cycles, duration, transient) == (None, None, None)
+        if solution.nbytes > LARGE and not chosen:
             size = size_words(solution.nbytes)
             note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
         growth = None
@@ -241,8 +243,6 @@ def run(
         turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
-        # nobody asked for the turns of a transient that ballpass chose: they are most of such a file
-        chosen = not model.manifest.run.stated and (cycles, duration, transient) == (None, None, None)
         kept = solution.steady() if chosen else solution
         summary, files = _write_results(
             model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept

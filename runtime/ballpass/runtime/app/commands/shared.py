@@ -50,6 +50,9 @@ NO_DERIVE = (
     "commands that simulate take a generated folder in place of the scene: ballpass run generated/punching_press"
 )
 
+#: Time without a line of progress where no bar can move [s].
+QUIET = 10.0
+
 #: Names of the stages as they are announced.
 STAGES = {
     "read": "reading the scene",
@@ -168,7 +171,7 @@ def size_words(count: int) -> str:
 
 
 class Stages:
-    """Progress on stderr: on a terminal bars that move, elsewhere one line when a stage begins."""
+    """Progress on stderr: on a terminal bars that move, elsewhere a line when a stage begins, a few of a long one."""
 
     def __init__(self) -> None:
         # with FORCE_COLOR rich takes a file for a terminal as well
@@ -181,7 +184,8 @@ class Stages:
             console=errors_console,
             disable=not self._moving,
         )
-        self._begin = time.perf_counter()
+        self._begin = self._written = time.perf_counter()
+        self._words = ""
         self._task: Any = None
 
     def __enter__(self) -> Stages:
@@ -201,18 +205,22 @@ class Stages:
 
     def __call__(self, name: str) -> None:
         self._finish()
-        words = STAGES.get(name, name)
+        self._words = STAGES.get(name, name)
         if self._moving:
-            self._task = self._progress.add_task(words, total=None)
+            self._task = self._progress.add_task(self._words, total=None)
         else:
-            errors_console.print(
-                f"{time.perf_counter() - self._begin:7.1f} s  {words}", highlight=False, soft_wrap=True
-            )
+            self._write(self._words)
 
     def fraction(self, done: float) -> None:
-        """Move the bar of the present stage to its finished fraction."""
+        """Move the bar of the present stage to its finished fraction; without a terminal, a line now and then."""
         if self._moving:
             self._progress.update(self._task, total=1.0, completed=done)
+        elif time.perf_counter() - self._written >= QUIET:
+            self._write(f"{self._words}, {100.0 * done:.0f} %")
+
+    def _write(self, words: str) -> None:
+        self._written = time.perf_counter()
+        errors_console.print(f"{self._written - self._begin:7.1f} s  {words}", highlight=False, soft_wrap=True)
 
 
 def name_of(scene: Path) -> str:
