@@ -37,7 +37,6 @@ from ballpass.runtime.export.model_description import (
     build_description,
     experiment,
     model_description,
-    time_of_turn,
 )
 from ballpass.runtime.export.scene_numbers import (
     MOMENT,
@@ -51,6 +50,7 @@ from ballpass.runtime.export.scene_numbers import (
 from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.driver_angle import period
 from ballpass.runtime.run.magnitudes import model_scales
 
 #: C of the interface, the standard's headers, and the licence of both.
@@ -195,7 +195,7 @@ def _magnitudes(model: LoadedModel) -> list[float]:
     numbers = model.numbers()
     initial = np.array([numbers.values[name] for name in model.manifest.initial])
     duration, _ = experiment(model.manifest)
-    scales = model_scales(model, numbers, initial, duration, time_of_turn(model.manifest))
+    scales = model_scales(model, numbers, initial, duration, period(model.manifest, numbers.values))
     return [float(size) for size in scales.magnitude]
 
 

@@ -19,6 +19,7 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies
 from ballpass.runtime.export.scene_numbers import computed_outputs, speed_table, varying
+from ballpass.runtime.run.driver_angle import period
 
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"
@@ -125,20 +126,9 @@ def _rate_unit(unit: str) -> str:
     return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
 
 
-def time_of_turn(manifest: Manifest) -> float:
-    """Time of a turn of driver or shaft, infinite where nothing turns [s]."""
-    name = None
-    if manifest.mechanism is not None:
-        name = manifest.mechanism.speed
-    elif manifest.bearing is not None:
-        name = manifest.bearing.ring_speed
-    speed = next((info.default for info in manifest.parameters if info.name == name), 0.0)
-    return 2.0 * math.pi / abs(speed) if speed else math.inf
-
-
 def experiment(manifest: Manifest) -> tuple[float, float]:
     """Length of the scene's run, and time between its samples [s]."""
-    run, turn = manifest.run, time_of_turn(manifest)
+    run, turn = manifest.run, period(manifest, {info.name: info.default for info in manifest.parameters})
     duration = run.duration if run.cycles is None else run.cycles * turn
     if duration is None or not math.isfinite(duration):
         return 1.0, 1.0 / run.samples_per_cycle

@@ -16,6 +16,7 @@ from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, InputInfo, M
 from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.driver_angle import speed_name
 from ballpass.runtime.run.locating import has_kinks, tight_below
 
 #: C sources that are the same for every scene, and templates of those that are not.
@@ -119,11 +120,7 @@ def scene_source(manifest: Manifest) -> str:
     """Text of ``scene.c``: the scene's numbers."""
     names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
     place = {name: k for k, name in enumerate(names)}
-    speed = -1
-    if manifest.mechanism is not None:
-        speed = place[manifest.mechanism.speed]
-    elif manifest.bearing is not None:
-        speed = place[manifest.bearing.ring_speed]
+    speed = speed_name(manifest)
     run = manifest.run
     methods = ("auto", *METHODS)
     changing = varying(manifest)
@@ -146,7 +143,7 @@ def scene_source(manifest: Manifest) -> str:
         CONSTANTS=_listed(_string(info.name) for info in manifest.constants),
         COLUMNS="\n".join(columns),
         INITIAL=_listed(str(place[name]) for name in manifest.initial),
-        SPEED=str(speed),
+        SPEED="-1" if speed is None else str(place[speed]),
         LINKAGE="".join(f"{line}\n" for line in _linkage(manifest, place)),
         PLACES="".join(f"{line}\n" for line in indices),
         INPUTS=inputs,

@@ -40,7 +40,7 @@ from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
-from ballpass.runtime.run.resolve import check_span
+from ballpass.runtime.run.resolve import check_span, check_transient
 
 if TYPE_CHECKING:
     import pandas
@@ -336,31 +336,24 @@ def _threads(given: int | None) -> int:
 def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
     """Lengths of the members' runs; members for which there is none are refused."""
     cycles, duration = asked_length(model, cycles, duration)
+    check_transient(transient)
     count = len(members)
-    durations, turns, starts = np.zeros(count), np.full(count, np.inf), np.zeros(count)
-    mechanism, bearing = model.manifest.mechanism, model.manifest.bearing
-    speed = mechanism.speed if mechanism is not None else bearing.ring_speed if bearing is not None else None
-    speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
-    np.divide(driver_angle.TURN, speeds, out=turns, where=speeds > 0.0)
-    # where all members have a run, at once; the rules of `check_span`
-    if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
-        durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns
-        starts = transient * turns if transient > 0.0 else starts
-        longest = np.minimum(MOST_TIME, MOST_TURNS * turns)
-        if np.all((starts < durations * (1.0 - 1e-9)) & (durations <= longest)):
-            return Span(durations=durations, turns=turns, starts=starts)
-    durations, starts = np.zeros(count), np.zeros(count)
-    for turn in np.unique(turns):
-        which = np.flatnonzero(turns == turn)
+    name = driver_angle.speed_name(model.manifest)
+    speeds = np.zeros(count) if name is None else np.abs(members.columns[name])
+    turns = np.divide(driver_angle.TURN, speeds, out=np.full(count, np.inf), where=speeds > 0.0)
+    durations = np.full(count, duration) if duration is not None else (cycles or 0.0) * turns
+    starts = transient * turns if transient > 0.0 else np.zeros(count)
+    # the rules of `check_span`, for all members at once
+    longest = np.minimum(MOST_TIME, MOST_TURNS * turns)
+    able = (starts < durations * (1.0 - 1e-9)) & (durations <= longest)
+    for member in np.flatnonzero(~able).tolist():
         try:
-            if duration is None and not np.isfinite(turn):
+            if duration is None and not np.isfinite(turns[member]):
                 raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
-            assert cycles is not None or duration is not None  # the manifest has one of the two
-            length = float(duration) if duration is not None else float(cycles or 0.0) * float(turn)
-            durations[which] = length
-            starts[which] = check_span(length, float(turn), transient)
+            check_span(float(durations[member]), float(turns[member]), transient)
         except RequestError as fault:
-            if len(which) == count:
+            if np.all(turns == turns[member]):  # and so with every other one
                 raise
-            members.refused.update((int(member), str(fault)) for member in which)
+            members.refused[member] = str(fault)
+            durations[member] = starts[member] = 0.0
     return Span(durations=durations, turns=turns, starts=starts)

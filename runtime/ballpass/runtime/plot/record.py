@@ -117,14 +117,11 @@ class Record:
     def crank_angle(self, t: Array | None = None) -> Array:
         """Angle of the driven body (shaft: from its place at t = 0) at `t` or the samples, not wrapped, (n,) [rad]."""
         time = self.t if t is None else t
-        mechanism, bearing = self.manifest.mechanism, self.bearing
+        mechanism = self.manifest.mechanism
         if mechanism is not None and mechanism.angle:
             return np.asarray(np.interp(time, self.t, self.solution[mechanism.angle]))
-        if mechanism is not None:
-            return self.parameter(mechanism.start_angle) + self.parameter(mechanism.speed) * time
-        if bearing is not None:
-            return self.parameter(bearing.ring_speed) * time
-        return np.zeros_like(time)
+        start = 0.0 if mechanism is None else self.parameter(mechanism.start_angle)
+        return start + driver_angle.shaft_speed(self.manifest, self._values) * time
 
     def load_windows(self) -> tuple[tuple[float, float], ...]:
         """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].

@@ -21,6 +21,7 @@ from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
 from ballpass.runtime.ratings.of_bearing import inner_ring_mass, rated_element
 from ballpass.runtime.ratings.result_limits import FLATTENED, MOST_DEFLECTION, limit_templates
+from ballpass.runtime.run.driver_angle import speed_name
 
 
 def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,7 +32,7 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
     place = {name: k for k, name in enumerate(known)}
     column = {name: k for k, name in enumerate(names)}
     run, mechanism = manifest.run, manifest.mechanism
-    speed = mechanism.speed if mechanism is not None else manifest.bearing.ring_speed if manifest.bearing else None
+    speed = speed_name(manifest)
     drawn = [info for info in (bearing_of(manifest, one["name"]) for one in numbers["bearings"]) if info is not None]
     return {
         "columns": names,
