@@ -13,6 +13,7 @@ import sympy as sp
 from ballpass.derive import derive
 from ballpass.derive.emit.kernel_headers import kernels_header
 from ballpass.derive.lowering.functions import LoweredFunctions, lower
+from ballpass.derive.mechanism.swing import OF_IDEAL_LINKAGE
 from ballpass.derive.scene.records import Scene
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -100,13 +101,20 @@ class Evaluators:
         return np.array(self.functions["constants"](p)).ravel()
 
     def by_sympy(self, point: Point) -> np.ndarray:
-        """The definitions put in one by one; elliptic integrals by mpmath; M a = f by elimination."""
+        """The definitions put in one by one; elliptic integrals by mpmath; M a = f by elimination.
+
+        Constants of the linkage without play, found along a whole turn, are those of CasADi.
+        """
         system, known = self.system, {TIME: _number(point.t)}
         for named, values in ((system.states, point.x), (system.inputs, point.u), (system.parameters, point.p)):
             known |= {n.symbol: _number(v) for n, v in zip(named, values, strict=True)}
         late = system.late
+        lowered = dict(zip((c.name for c in self.functions.constants), self.constants(point.p), strict=True))
+        for definition in system.constants:
+            if sp.sympify(definition.expression).has(*OF_IDEAL_LINKAGE):
+                known[definition.symbol] = _number(lowered[definition.symbol.name])
         for definition in (*system.constants, *system.definitions):
-            if definition.symbol not in late:
+            if definition.symbol not in late and definition.symbol not in known:
                 known[definition.symbol] = _evaluated(definition.expression, known)
         totals: dict[sp.Symbol, sp.Expr] = {}
         for bearing in system.bearings:

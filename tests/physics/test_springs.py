@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import pytest
 
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
-from ballpass.runtime import Model
+from ballpass.runtime import Model, Solution, UnusualWarning
 from ballpass.runtime.point.jacobian import quantity_values
 
 SPRING = """[mechanism.springs.return]
@@ -34,6 +34,7 @@ preload = "3 N*m"
 HOOK = 0.25 + 0.18j
 PLACE = '[mechanism.frame.points]\nhook = ["250 mm", "180 mm"]\n'
 OUTPUTS = ('"body.*"]', '"body.*", "spring.*", "torsion_spring.*"]')
+FREE_ANGLE = "mechanism.torsion_springs.twist.free_angle"
 K, FREE, C, PRELOAD = 2000.0, 0.15, 40.0, 20.0
 TURN = np.arange(256) * 2 * np.pi / 256
 
@@ -72,8 +73,8 @@ def lever(crank: np.ndarray, speed: float) -> Lever:
     return Lever(np.abs(line), length_rate, np.angle(slot), angle_rate)
 
 
-def along_turn(model: Model, of: str) -> np.ndarray:
-    numbers = model.numbers()
+def along_turn(model: Model, of: str, parameters: Mapping[str, float] | None = None) -> np.ndarray:
+    numbers = model.numbers(parameters)
     speed = numbers.values["mechanism.driver.speed"]
     return np.array([quantity_values(model, numbers, of, t=a / speed, x=None)[0] for a in TURN])
 
@@ -104,18 +105,33 @@ def test_a_cubic_stiffness_goes_with_a_stiffness(scene_text: Callable[..., str])
     assert [fault.key for fault in caught.value.faults] == ["mechanism.springs.return.cubic_stiffness"]
 
 
-def test_a_torsion_spring_that_jumps_is_said(make_model: Callable[..., Model]) -> None:
-    """Counted in a finely sampled turn, in which the torque jumps by stiffness times a turn."""
+def test_a_torsion_spring_of_a_body_that_swings_does_not_jump(make_model: Callable[..., Model]) -> None:
+    """The lever swings from 66 to 114 degrees, on either side of half a turn from some of these free angles."""
+    model = make_model("crank_shaper", *changes(TWIST), (OUTPUTS[0], OUTPUTS[1].replace('"spring.*", ', "")))
+    closed = lever(TURN, model.parameters["mechanism.driver.speed"])
+    for free in np.radians([80.0, -80.0, -95.0, -112.0, 250.0]):
+        excess = closed.angle - free
+        excess -= 2.0 * np.pi * np.round(np.mean(excess) / (2.0 * np.pi))
+        found = along_turn(model, "torsion_spring.twist.torque", {FREE_ANGLE: float(free)})
+        assert found == pytest.approx(3.0 + 30.0 * excess + 0.5 * closed.angle_rate, rel=1e-11, abs=1e-11)
+
+
+def test_a_torsion_spring_between_bodies_that_turn_warns_in_every_question(make_model: Callable[..., Model]) -> None:
+    """Its torque jumps by stiffness times a turn, once a turn."""
     outputs = (OUTPUTS[0], OUTPUTS[1].replace('"spring.*", ', ""))
-    model = make_model(
-        "crank_shaper", *changes(TWIST, TWIST.replace("twist", "wound").replace("lever", "crank")), outputs
+    model = make_model("crank_shaper", *changes(TWIST.replace("lever", "crank")), outputs)
+    questions: tuple[Callable[[dict[str, float]], object], ...] = (
+        lambda numbers: model.simulate(cycles=1.0, parameters=numbers),
+        lambda numbers: model.sensitivity(
+            "rms:inner.y", "bearing.clearance", cycles=1.0, transient=0, parameters=numbers
+        ),
+        lambda numbers: model.life(cycles=1.0, transient=0, parameters=numbers),
+        lambda numbers: model.explain(numbers),
     )
-    for free in (math.radians(80.0), math.radians(-95.0)):
-        numbers = {"mechanism.torsion_springs.twist.free_angle": free}
-        run, limits = model.simulate(cycles=1.0, parameters=numbers), model.explain(numbers).limits
-        for name in ("twist", "wound"):
-            torque = run[f"torsion_spring.{name}.torque"]
-            jumps = np.count_nonzero(np.abs(torque - np.roll(torque, 1)) > 30.0 * np.pi)
-            assert model.constants(numbers)[f"torsion_spring.{name}.jumps"] == jumps
-            said = [words for words in limits if f"torsion_spring.{name}: its torque jumps" in words]
-            assert len(said) == (jumps > 0) == (name == "wound" or free < 0.0)
+    words = r"torsion_spring.twist.turns = 1: unusual. Usual is 0. .* the torque jumps"
+    for degrees, ask in zip((81.0, 82.0, 83.0, 84.0), questions, strict=True):  # said once of the same numbers
+        with pytest.warns(UnusualWarning, match=words):
+            found = ask({FREE_ANGLE: math.radians(degrees)})
+        if isinstance(found, Solution):
+            torque = found["torsion_spring.twist.torque"]
+            assert np.count_nonzero(np.abs(torque - np.roll(torque, 1)) > 30.0 * np.pi) == 1

@@ -44,7 +44,10 @@ def test_a_slip_is_said_before_a_run(make_model: Callable[..., Model], numbers: 
 
 def said(scene: Scene) -> list[str]:
     """What is said of a scene's own numbers, without deriving it."""
-    return unusual(cast(Manifest, SimpleNamespace(usual=usual_ranges(scene), parameters=numbers(scene))), values(scene))
+    return unusual(
+        cast(Manifest, SimpleNamespace(usual=usual_ranges(scene), parameters=numbers(scene), constants=())),
+        values(scene),
+    )
 
 
 def numbers(scene: Scene) -> list[SimpleNamespace]:

@@ -17,7 +17,7 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.elements.hertz import ellipticity
-from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Jumps, Turns, positions_of
+from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
 from ballpass.derive.variables import DRIVER_ANGLE
 
 #: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
@@ -253,9 +253,6 @@ class Visitor:
             *((visit(expression.args[0]), visit(expression.args[1])) for visit in map(at, angles)), strict=True
         )
         pairs = [(k, (k + 1) % POINTS) for k in range(POINTS)]
-        if isinstance(expression, Jumps):
-            found = list(map(ca.atan2, sin, cos))
-            return ca.SX(reduce(add, (ca.if_else(ca.fabs(found[j] - found[i]) > ca.pi, 1.0, 0.0) for i, j in pairs)))
         if isinstance(expression, Turns):
             turned = [ca.atan2(cos[i] * sin[j] - sin[i] * cos[j], cos[i] * cos[j] + sin[i] * sin[j]) for i, j in pairs]
             whole = ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5)

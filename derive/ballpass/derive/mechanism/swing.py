@@ -41,12 +41,8 @@ class Mean(sp.Function):  # type: ignore[misc]
     """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns, rounded [rad]."""
 
 
-class Jumps(sp.Function):  # type: ignore[misc]
-    """``Jumps(cos, sin, *positions)``: how often ``atan2(sin, cos)`` jumps by a turn, in a turn of the driver."""
-
-
 #: Functions of the linkage without play: constants of a run.
-OF_IDEAL_LINKAGE = (Ideal, Turns, Mean, Jumps)
+OF_IDEAL_LINKAGE = (Ideal, Turns, Mean)
 
 
 def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:

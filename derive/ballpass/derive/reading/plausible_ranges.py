@@ -24,7 +24,7 @@ def usual_ranges(scene: Scene) -> tuple[UsualInfo, ...]:
     if scene.mechanism is not None:
         for force in scene.mechanism.forces:
             found += _declared(quantities_of(force), known)
-            found += force.law.usual(scene.mechanism.driver)
+            found += (*force.law.usual(scene.mechanism.driver), *force.pathway.usual(force))
     found += _declared(quantities_of(scene.bearings), known)
     at_joint = sorted(scene.bearings, key=lambda bearing: bearing.joint or "")
     for joint, group in groupby(at_joint, key=lambda bearing: bearing.joint):

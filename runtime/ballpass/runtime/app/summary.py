@@ -117,8 +117,9 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
     grown = [growth.words] if growth is not None and growth.words else []
-    summary["limits"] = list(limits_of_model(manifest, model.numbers(sol.parameters).values))
-    summary["warnings"] = [*unusual(manifest, sol.parameters), *found, *grown]
+    values = model.numbers(sol.parameters).values
+    summary["limits"] = list(limits_of_model(manifest, values))
+    summary["warnings"] = [*unusual(manifest, values), *found, *grown]
     return summary
 
 

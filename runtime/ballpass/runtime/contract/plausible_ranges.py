@@ -26,10 +26,13 @@ def unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> li
 
     Parameters
     ----------
-    columns : values of all parameters by name: numbers, or arrays of one shape, a value for each member
+    columns : values of all parameters by name: numbers, or arrays of one shape, a value for each member; and derived
+        constants, where they are known
     """
     said = []
     for info in manifest.usual:
+        if any(name not in columns for name in info.names):
+            continue
         odd = _outside(info, columns)
         # an array for each range would take longer than a short run
         if odd if isinstance(odd, bool) else np.any(odd):
@@ -62,7 +65,9 @@ def usual_template(manifest: Manifest, info: UsualInfo) -> tuple[str, str]:
 
     They are filled with the values of `names` and, behind these, the first one over `of`, else their sum.
     """
-    units = {item.name: "" if item.unit == "1" else f" {item.unit}" for item in manifest.parameters}
+    known = {item.name: item.unit for item in manifest.parameters}
+    known |= {item.name: item.unit for item in manifest.constants}
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in known.items()}
     given = " and ".join(f"{name} = {{{k}:.4g}}{units[name]}" for k, name in enumerate(info.names))
     unit, behind = "" if info.of else units[info.names[0]], len(info.names)
     if info.of:

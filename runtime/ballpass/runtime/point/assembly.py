@@ -56,10 +56,10 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
     for constant in model.manifest.constants:
         if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
-            body = constant.name.removeprefix("body.").removesuffix(".turns")
+            what = constant.name.removeprefix("body.").removesuffix(".turns")
             raise RequestError(
-                f"The {body} turns by more than three eighths of a turn while the driver turns by 7.5 degrees: which "
-                "way its bearings' balls went is unknown. Change lengths so that no joint passes another so near."
+                f"The angle of {what} changes by more than three eighths of a turn while the driver turns by 7.5 "
+                "degrees: which way round is unknown. Change lengths so that no joint passes another so near."
             )
 
 

@@ -201,7 +201,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         unsupported=unsupported,
         method=method,
         reason=reason,
-        unusual=tuple(unusual(manifest, numbers.parameters)),
+        unusual=tuple(unusual(manifest, values)),
         limits=tuple(limits_of_model(manifest, values)),
     )
 

@@ -14,8 +14,7 @@ _BODY, _MASS = "mechanism.bodies.", ".mass"
 
 
 def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator[str]:
-    """Linkages that outweigh the ring of a bearing that is loaded one-way, torsion springs that jump, forces that
-    begin at once.
+    """Linkages that outweigh the ring of a bearing that is loaded one-way, forces that begin at once.
 
     Parameters
     ----------
@@ -30,13 +29,6 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
                 "bearing its part, as share = 0.5."
             )
         return
-    for info in manifest.constants:
-        if info.name.endswith(".jumps") and values[info.name] > 0.0:
-            yield (
-                f"{info.name.removesuffix('.jumps')}: its torque jumps, because the angle between its bodies passes "
-                "half a turn from the free one. Torsion springs and stops are for bodies that swing: take others, "
-                "or another free angle."
-            )
     if not manifest.bearings:
         return
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))

@@ -50,7 +50,7 @@ class PointModel(LoadedModel):
         looked_at = numbers.p.tobytes()
         if looked_at != self._looked_usual:
             self._looked_usual = looked_at
-            warn_unusual(self.manifest, numbers.parameters)
+            warn_unusual(self.manifest, numbers.values)
         return numbers
 
     def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:

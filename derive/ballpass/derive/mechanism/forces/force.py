@@ -139,6 +139,10 @@ class Pathway(ABC):
     def words(self) -> str:
         """Its name in texts: "force on slider.C"."""
 
+    def usual(self, force: Force) -> Iterable[UsualInfo]:
+        """Ranges in which what its motion depends on usually lies."""
+        return ()
+
 
 class Law(ABC):
     """How large a force is; a frozen record of the scene.
