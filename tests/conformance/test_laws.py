@@ -100,8 +100,8 @@ def test_the_force_is_that_of_its_formula(law: str) -> None:
     for delta in (-3e-6, -1e-12, 1e-12, 5e-6):
         for rate in (-0.02, 0.0, 0.013):
             elastic, damping = (float(v) for v in functions["contact"](delta, rate, p, c))
-            assert elastic == pytest.approx(k_b * max(delta, 0.0) ** 1.5, rel=1e-14)
-            assert damping == pytest.approx(FORMULAS[law](delta, rate, k_b, coefficient), rel=1e-14)
+            assert elastic == pytest.approx(k_b * max(delta, 0.0) ** 1.5, rel=1e-14, abs=0.0)
+            assert damping == pytest.approx(FORMULAS[law](delta, rate, k_b, coefficient), rel=1e-14, abs=0.0)
 
 
 def test_the_papers_ratio_in_millimetres_and_in_si() -> None:

@@ -182,7 +182,7 @@ def test_folder_of_a_scene_with_numbers_is_taken_over_by_the_same_scene_with_a_n
 )
 def test_clearance_of_a_group_is_its_median(designation: str, group: str, least: int, most: int) -> None:
     found = bearing(named(designation, group))
-    assert found.clearance.value == pytest.approx((least + most) / 2 * 1e-6, rel=1e-12)
+    assert found.clearance.value == pytest.approx((least + most) / 2 * 1e-6, rel=1e-12, abs=0.0)
     assert found.catalogue is not None
     assert found.catalogue.clearance_range == (least / 1e6, most / 1e6)
 
@@ -216,16 +216,16 @@ def test_fits_and_temperatures_reduce_clearance_and_group() -> None:
     inner, outer = 33.5 - 7.9375, 33.5 + 7.9375
     warming = 11.5e-6 * (inner * 8.0 + 2 * 7.9375 * 4.0) * 1e-3
     lost = 10e-6 * 20 / inner + 5e-6 * outer / 47 + warming
-    assert found.clearance.value == pytest.approx(20.5e-6 - lost, rel=1e-9)
+    assert found.clearance.value == pytest.approx(20.5e-6 - lost, rel=1e-9, abs=0.0)
     assert found.catalogue is not None
-    assert found.catalogue.clearance_range == pytest.approx((13e-6 - lost, 28e-6 - lost), rel=1e-9)
+    assert found.catalogue.clearance_range == pytest.approx((13e-6 - lost, 28e-6 - lost), rel=1e-9, abs=0.0)
 
 
 def test_a_group_may_stand_where_a_number_is_written() -> None:
     scene = read(named("6204", more='fit = { inner_warming = "8 K" }\n'))
     lost = 11.5e-6 * ((33.5 - 7.9375) * 8.0 + 2 * 7.9375 * 4.0) * 1e-3
     path, value = parse_override(scene, "bearing.clearance=C3")
-    assert (path, value) == ("bearing.clearance", pytest.approx(20.5e-6 - lost, rel=1e-12))
+    assert (path, value) == ("bearing.clearance", pytest.approx(20.5e-6 - lost, rel=1e-12, abs=0.0))
     for group in ("C2", "CN", "C3", "C4", "C5"):
         assert (
             parse_override(read(named("6316")), f"bearing.clearance={group}")[1]

@@ -58,7 +58,7 @@ from ballpass.runtime.contract.units import table_unit
     ],
 )
 def test_sizes_of_units_are_those_of_their_definitions(text: object, unit: str, value: float) -> None:
-    assert parse_quantity(text, unit) == pytest.approx(value, rel=4e-16)
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=4e-16, abs=0.0)
 
 
 @pytest.mark.parametrize("rpm", ["1", "500", "393.1540342298", "-0.1"])
@@ -197,7 +197,7 @@ def test_sizes_agree_with_pints_own_conversion(name: str) -> None:
     quantity = pint.get_application_registry().Quantity(2.5, name).to_base_units()
     unit = {"kilogram": "kg", "meter": "m", "second": "s", "radian": "rad"}
     target = "*".join(f"{unit[base]}^{power}" for base, power in quantity.unit_items())
-    assert parse_quantity(f"2.5 {name}", target) == pytest.approx(quantity.magnitude, rel=1e-14)
+    assert parse_quantity(f"2.5 {name}", target) == pytest.approx(quantity.magnitude, rel=1e-14, abs=0.0)
 
 
 def test_sizes_kept_here_are_those_of_pint() -> None:
@@ -226,9 +226,9 @@ def test_refusals_name_the_kind_that_is_asked_for() -> None:
 def test_a_number_of_a_table_is_read_in_a_scene(unit: str) -> None:
     factor, shown = table_unit(unit)
     assert not [sign for sign in ("*", "^2", "um") if sign in shown]
-    assert parse_quantity(f"{factor!r} {shown}", unit) == pytest.approx(1.0, rel=1e-15)
+    assert parse_quantity(f"{factor!r} {shown}", unit) == pytest.approx(1.0, rel=1e-15, abs=0.0)
 
 
 def test_rational_powers_multiply() -> None:
     exact = Fraction(1, 1000) ** 3
-    assert parse_quantity("1 (mm^1.5)^2", "m^3") == pytest.approx(float(exact), rel=1e-15)
+    assert parse_quantity("1 (mm^1.5)^2", "m^3") == pytest.approx(float(exact), rel=1e-15, abs=0.0)

@@ -47,8 +47,8 @@ def test_stiffness_is_palmgrens_approach_twice(rotor: Model) -> None:
     constants = rotor.constants()
     for force in (1.0, 100.0, 5e3):
         approach = 3.84e-5 * force**0.9 / 8.0**0.8
-        assert 1e3 * (force / constants["bearing.k_i"]) ** 0.9 == pytest.approx(approach, rel=1e-12)
-        assert 1e3 * (force / constants["bearing.k_b"]) ** 0.9 == pytest.approx(2.0 * approach, rel=1e-12)
+        assert 1e3 * (force / constants["bearing.k_i"]) ** 0.9 == pytest.approx(approach, rel=1e-12, abs=0.0)
+        assert 1e3 * (force / constants["bearing.k_b"]) ** 0.9 == pytest.approx(2.0 * approach, rel=1e-12, abs=0.0)
 
 
 def test_radial_integral_of_a_line_contact(make_model: Callable[..., Model]) -> None:
@@ -78,7 +78,7 @@ def test_hertz_pressure_balances_the_load_and_flattens_the_contact(rotor: Model)
         force = 1234.0
         half_length, width = contact.semi_axes(force)
         peak = contact.peak_pressure(force)
-        assert half_length == pytest.approx(LENGTH / 2.0, rel=1e-15)
+        assert half_length == pytest.approx(LENGTH / 2.0, rel=1e-15, abs=0.0)
 
         def pressure(x: float, peak: float = peak, width: float = width) -> float:
             return peak * math.sqrt(max(1.0 - (x / width) ** 2, 0.0))

@@ -93,16 +93,16 @@ def test_a_burst_gives_a_free_ring_its_impulse_and_a_verified_slope(make_model: 
     )
     model = make_model("varying_compliance", (OLD, burst), *free)
     run = model.simulate(duration=0.01, transient=0, outputs=[])
-    assert run["inner.vx"][-1] == pytest.approx(8.0 * 0.003 / 20.0, rel=1e-12)
-    assert run["inner.vy"][-1] == pytest.approx(-3.0 * 0.003 / 20.0, rel=1e-12)
+    assert run["inner.vx"][-1] == pytest.approx(8.0 * 0.003 / 20.0, rel=1e-12, abs=0.0)
+    assert run["inner.vy"][-1] == pytest.approx(-3.0 * 0.003 / 20.0, rel=1e-12, abs=0.0)
     edges = ["load.time_window.start", "load.time_window.end"]
     slopes = model.sensitivities(edges, duration=0.01)
     by_start, by_end = (slopes["inner.x", edge][-1] for edge in edges)
-    assert by_start == pytest.approx(-8.0 / 20.0 * (0.01 - 0.002), rel=1e-9)
-    assert by_end == pytest.approx(8.0 / 20.0 * (0.01 - 0.005), rel=1e-9)
+    assert by_start == pytest.approx(-8.0 / 20.0 * (0.01 - 0.002), rel=1e-9, abs=0.0)
+    assert by_end == pytest.approx(8.0 / 20.0 * (0.01 - 0.005), rel=1e-9, abs=0.0)
     ends = [0.003, 0.004, 0.009]
     lanes = model.simulate_many({edges[1]: ends}, ["end:inner.vx"], duration=0.01, transient=0)
-    assert lanes["end:inner.vx"] == pytest.approx([8.0 * (end - 0.002) / 20.0 for end in ends], rel=1e-12)
+    assert lanes["end:inner.vx"] == pytest.approx([8.0 * (end - 0.002) / 20.0 for end in ends], rel=1e-12, abs=0.0)
 
 
 def test_a_preloaded_rotor_answers_its_unbalance_like_a_linear_one(make_model: Callable[..., Model]) -> None:

@@ -152,7 +152,7 @@ def test_a_roughness_is_its_waves(scene_text: Callable[..., str]) -> None:
     first, again, other = read("inner_waviness", 1), read("inner_waviness", 1), read("inner_waviness", 2)
     assert first == again
     assert [first[f"{n}.amplitude"] for n in range(4, 10)] == pytest.approx(
-        [0.2e-6 * (4 / n) ** 1.5 for n in range(4, 10)]
+        [0.2e-6 * (4 / n) ** 1.5 for n in range(4, 10)], rel=1e-12, abs=0.0
     )
     phases = [first[f"{n}.phase"] for n in range(4, 10)]
     assert len(set(phases)) == 6

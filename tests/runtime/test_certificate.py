@@ -152,7 +152,9 @@ def test_what_is_found_of_a_pair_does_not_depend_on_the_others() -> None:
         for column, name in enumerate("ab"):
             alone = found([row], [name])
             for of in ("value", "uncertainty", "below", "above"):
-                assert getattr(alone, of)[0, 0] == pytest.approx(getattr(together, of)[row, column], rel=0, nan_ok=True)
+                assert getattr(alone, of)[0, 0] == pytest.approx(
+                    getattr(together, of)[row, column], rel=0, nan_ok=True, abs=0.0
+                )
     assert together.sides(3, 0) is not None
 
 
@@ -175,7 +177,7 @@ def test_the_number_known_better_is_given_and_none_where_nothing_is_known(
 ) -> None:
     check = compare(derivative, own, second, uncertainty, route="x", quantum=0.0)
     value, _, of_second = better_known(derivative, own, check)
-    assert value == pytest.approx(given, rel=0, nan_ok=True)
+    assert value == pytest.approx(given, rel=0, nan_ok=True, abs=0.0)
     assert of_second is by_second
 
 
@@ -193,7 +195,7 @@ def test_the_stated_uncertainty_reaches_to_a_number_that_excludes_the_derivative
     check = compare(1.0, own, second, uncertainty, route="x", quantum=0.0)
     value, known, of_second = better_known(1.0, own, check)
     assert not of_second
-    assert (value, known) == pytest.approx((1.0, stated), rel=1e-9)
+    assert (value, known) == pytest.approx((1.0, stated), rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(("own", "second"), [(1.6e-2, 1e-9), (1e-9, 1.6e-2), (3e-2, 3e-2), (0.0, 1.0)])
@@ -245,7 +247,7 @@ def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
     found = model.sensitivity(*names, **options)  # type: ignore[arg-type]
     (pair,) = found.disagreements
     assert pair.check.value == pytest.approx(right.pairs[0].by_steps, rel=1e-5)
-    assert pair.by_steps == pytest.approx(1.01 * right.pairs[0].by_steps, rel=1e-12)
+    assert pair.by_steps == pytest.approx(1.01 * right.pairs[0].by_steps, rel=1e-12, abs=0.0)
     assert pair.derivative in (pair.by_steps, pair.check.value)
 
 
@@ -291,16 +293,16 @@ def test_one_quantity_has_one_value_whoever_is_asked(make_model: Callable[..., M
     few = model.sensitivity(of, "bearing.share", check=False)
     more = model.sensitivity([*of, "mean:ball.elastic_force[3]"], "bearing.share", check=False)
     for a, b in zip(few.pairs, more.pairs, strict=False):
-        assert a.value == pytest.approx(b.value, rel=1e-6)
-        assert a.derivative == pytest.approx(b.derivative, rel=1e-4)
+        assert a.value == pytest.approx(b.value, rel=1e-6, abs=0.0)
+        assert a.derivative == pytest.approx(b.derivative, rel=1e-4, abs=0.0)
     run = model.simulate(rtol=1e-10, samples_per_cycle=50).steady().reductions
     reduced = model.reduce(rtol=1e-10)
     assert run is not None
     many = model.simulate_many({"bearing.share": [model.parameters["bearing.share"]]}, of, rtol=1e-10)
     for found in (run, reduced):
         values = (found["ball.force"].maximum, found["inner.x"].rms, found["outer.y"].mean)
-        assert values == pytest.approx([pair.value for pair in few.pairs], rel=1e-6)
-    assert [many[name][0] for name in of] == pytest.approx([pair.value for pair in few.pairs], rel=1e-6)
+        assert values == pytest.approx([pair.value for pair in few.pairs], rel=1e-6, abs=0.0)
+    assert [many[name][0] for name in of] == pytest.approx([pair.value for pair in few.pairs], rel=1e-6, abs=0.0)
 
 
 def test_derivatives_in_chaos_are_refused(model: Model) -> None:

@@ -35,7 +35,7 @@ def test_limits_of_a_swing_follow_from_the_way_of_the_balls() -> None:
     """At the critical amplitude a ball comes to where the next one stood; at the dither amplitude, as far as 2 b."""
     found = oscillation(0.1, 1.0, dynamic_rating=1.0, exponent=3.0, balls=8, gamma=GAMMA, contacts=SIZES)
     cage = (1.0 - GAMMA) / 2.0
-    assert 2.0 * found.critical * min(cage, 1.0 - cage) == pytest.approx(2.0 * math.pi / 8, rel=1e-12)
+    assert 2.0 * found.critical * min(cage, 1.0 - cage) == pytest.approx(2.0 * math.pi / 8, rel=1e-12, abs=0.0)
     ways = [2.0 * found.dither * share * radius for share, (_, radius) in zip((1.0 - cage, cage), SIZES, strict=True)]
     assert all(way >= 2.0 * half * (1.0 - 1e-12) for way, (half, _) in zip(ways, SIZES, strict=True))
     assert min(way / half for way, (half, _) in zip(ways, SIZES, strict=True)) == pytest.approx(2.0, rel=1e-12)
@@ -53,7 +53,7 @@ def test_rings_tilt_freely_until_the_first_ball_touches(clearance: float) -> Non
     along = np.hypot(turned[0], turned[1])
     apart = np.hypot(along - outer, turned[2])
     limit = sum(GROOVES) - BALL
-    assert np.max(apart) == pytest.approx(limit, rel=1e-9)
+    assert np.max(apart) == pytest.approx(limit, rel=1e-9, abs=0.0)
     assert int(np.argmax(apart)) in (0, 360, 720)
     assert 2.0 * ARCMIN < tilt < 25.0 * ARCMIN  # catalogues of deep groove bearings: some arcminutes
     assert free_tilt(BALL, PITCH, GROOVES, -1e-6) == 0.0
@@ -77,7 +77,7 @@ def test_a_tilt_beyond_the_clearance_is_a_warning(make_model: Callable[..., Mode
     within = make_model("rotor", ("[bearing.damping]", ALIGNED.format("2 arcmin", shaft))).life(cycles=3, transient=2)
     (bearing,) = within.bearings
     assert bearing.tilt is not None
-    assert bearing.tilt.bending == pytest.approx(shaft_slope(bearing.equivalent_load, 0.2, 0.02), rel=1e-12)
+    assert bearing.tilt.bending == pytest.approx(shaft_slope(bearing.equivalent_load, 0.2, 0.02), rel=1e-12, abs=0.0)
     assert bearing.tilt.beyond == ""
     beyond = make_model("rotor", ("[bearing.damping]", ALIGNED.format("20 arcmin", ""))).life(cycles=3, transient=2)
     assert any("tilted by 20 arcmin" in words for words in beyond.beyond)

@@ -104,7 +104,7 @@ def test_a_falling_ring_meets_its_ball_when_the_parabola_says(
     """From rest in the middle of the clearance: delta = F t^2 / (2 m) - P_d / 2."""
     model: Model = request.getfixturevalue(law)
     located = time_of_kink(model, np.zeros(4), 0.02, family, {"bearing.clearance": CLEARANCE})
-    assert located == pytest.approx(np.sqrt(CLEARANCE * MASS / LOAD), rel=1e-12)
+    assert located == pytest.approx(np.sqrt(CLEARANCE * MASS / LOAD), rel=1e-12, abs=0.0)
 
 
 #: Length of a run of the preloaded ring, and numbers of equal steps at which the order shows, far from rounding: of
@@ -515,7 +515,7 @@ def test_reductions_locate_as_runs_do(gated: Model) -> None:
     solution = gated.simulate(**given)  # type: ignore[arg-type]
     reduced = gated.reduce(**given)  # type: ignore[arg-type]
     assert reduced.steps == solution.statistics.steps
-    assert [reduced.end[name] for name in gated.states] == pytest.approx(solution.x[-1].tolist(), rel=1e-12)
+    assert [reduced.end[name] for name in gated.states] == pytest.approx(solution.x[-1].tolist(), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize(

@@ -91,4 +91,4 @@ def test_a_code_and_a_filter_give_the_factor_of_the_annex(make_model: Callable[.
     film = '[bearing.lubrication]\nviscosity_ratio = 0.8\noil_code = "-/15/12"\nfilter = "in line"\n'
     (found,) = make_model("rotor", (END, film + END)).life(cycles=3, transient=2).bearings
     share = min(0.0432 * 0.8**0.68 * 33.5**0.55, 1.0)
-    assert found.contamination == pytest.approx(share * (1.0 - 0.9987 / 33.5 ** (1 / 3)), rel=1e-12)
+    assert found.contamination == pytest.approx(share * (1.0 - 0.9987 / 33.5 ** (1 / 3)), rel=1e-12, abs=0.0)

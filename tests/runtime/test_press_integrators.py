@@ -134,7 +134,7 @@ def test_acceleration_jumps_where_the_punch_starts_and_ends(press: Make, name: s
     solution = model.simulate(cycles=1, samples_per_cycle=36000, method=method, rtol=1e-6, transient=0)
     step, velocity = period / 36000, solution["inner.vy"]
     for edge, k, starts in ((237.0, 23700, True), (267.0, 26700, False)):
-        assert solution.t[k] * 2.0 * math.pi / period == pytest.approx(math.radians(edge), rel=1e-15)
+        assert solution.t[k] * 2.0 * math.pi / period == pytest.approx(math.radians(edge), rel=1e-15, abs=0.0)
         before = np.dot([1.0, -4.0, 3.0], velocity[k - 2 : k + 1]) / (2.0 * step)
         behind = np.dot([-3.0, 4.0, -1.0], velocity[k : k + 3]) / (2.0 * step)
         wanted = [hand.rate(float(solution.t[k]), solution.x[k], punch)[5] for punch in (not starts, starts)]

@@ -210,7 +210,7 @@ def test_pure_rolling_lines_balance_friction() -> None:
     assert c == pytest.approx(0.347296, abs=5e-7)
     assert c**3 - 3 * c + 1 == pytest.approx(0.0, abs=1e-14)
     within = quad(lambda x: 1 - x * x, 0, c)[0]
-    assert within == pytest.approx(quad(lambda x: 1 - x * x, c, 1)[0], rel=1e-12)
+    assert within == pytest.approx(quad(lambda x: 1 - x * x, c, 1)[0], rel=1e-12, abs=0.0)
     slip = groove_slip.creepage(np.array([0.0, c, -c, 1.0]) * 1e-3, 1e-3, BALL, 12.78e-3, 0.52 * BALL)
     assert slip[1:3] == pytest.approx(0.0, abs=1e-15)
     assert slip[0] < 0.0 < slip[3]
@@ -226,7 +226,7 @@ def test_ellipse_agrees_with_scipys_elliptic_integrals(ratio: float) -> None:
     assert kappa == pytest.approx(brentq(residual, 1.0 + 1e-9, 1e4, xtol=1e-13), rel=1e-9)
     second, excess = ellipse.elliptic_integrals(kappa)
     m = 1.0 - kappa**-2
-    assert second == pytest.approx(ellipe(m), rel=1e-13)
+    assert second == pytest.approx(ellipe(m), rel=1e-13, abs=0.0)
     assert excess == pytest.approx(ellipk(m) / ellipe(m) - 1, rel=1e-8)
 
 
@@ -241,13 +241,15 @@ def test_pressure_over_the_ellipse_carries_the_load() -> None:
     assert ellipse.load_at_pressure(pressure, kappa, curvature, soft) == pytest.approx(500.0, rel=1e-12)
     radius = 5e-3
     circle = ellipse.semi_axes(500.0, 1.0, 2.0 / radius, soft)
-    assert circle == pytest.approx([(0.75 * 500.0 * radius * soft) ** (1 / 3)] * 2, rel=1e-12)
+    assert circle == pytest.approx([(0.75 * 500.0 * radius * soft) ** (1 / 3)] * 2, rel=1e-12, abs=0.0)
 
 
 def test_fits_of_solid_steel_pass_on_their_ratio_of_diameters() -> None:
     """Ring and shaft of one steel: the raceway grows by I d/D; a thick housing likewise; Lamé."""
-    assert mounted_clearance.inner_growth(10e-6, 20e-3, 25.6e-3) == pytest.approx(10e-6 * 20 / 25.6, rel=1e-12)
-    assert mounted_clearance.outer_shrinkage(10e-6, 47e-3, 41.4e-3) == pytest.approx(10e-6 * 41.4 / 47, rel=1e-12)
+    assert mounted_clearance.inner_growth(10e-6, 20e-3, 25.6e-3) == pytest.approx(10e-6 * 20 / 25.6, rel=1e-12, abs=0.0)
+    assert mounted_clearance.outer_shrinkage(10e-6, 47e-3, 41.4e-3) == pytest.approx(
+        10e-6 * 41.4 / 47, rel=1e-12, abs=0.0
+    )
     hollow = mounted_clearance.inner_growth(10e-6, 20e-3, 25.6e-3, shaft_bore=15e-3)
     assert 0.0 < hollow < 10e-6 * 20 / 25.6
     aluminium = mounted_clearance.outer_shrinkage(10e-6, 47e-3, 41.4e-3, housing=(70e9, 0.33))
@@ -257,7 +259,7 @@ def test_fits_of_solid_steel_pass_on_their_ratio_of_diameters() -> None:
 def test_equal_warming_of_all_parts_keeps_the_clearance() -> None:
     assert mounted_clearance.thermal_reduction(20.0, 20.0, 20.0, BALL, PITCH) == pytest.approx(0.0, abs=1e-18)
     lost = mounted_clearance.thermal_reduction(10.0, 5.0, 0.0, BALL, PITCH)  # α 10 K D_pw
-    assert lost == pytest.approx(11.5e-6 * 10 * PITCH, rel=1e-12)
+    assert lost == pytest.approx(11.5e-6 * 10 * PITCH, rel=1e-12, abs=0.0)
 
 
 def test_ratings_that_a_scene_gives_stand_before_formulas() -> None:

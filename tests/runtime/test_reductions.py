@@ -57,7 +57,7 @@ def test_reductions_equal_those_of_fifty_thousand_samples_a_cycle(
         near = 3e-3 if name in BALLS else 2e-4
         assert reduction.minimum == pytest.approx(most.min(), abs=near * size), name
         length = samples.t[-1] - samples.t[0]
-        assert found.duration == pytest.approx(length, rel=1e-12)
+        assert found.duration == pytest.approx(length, rel=1e-12, abs=0.0)
         # Boole's rule is exact for the states of all but DOP853, whose long steps also hold more kinks of the forces
         long = method == "stepper-dop853"
         jumps = law == "one-sided-gated"
@@ -163,7 +163,7 @@ def test_harmonic_motion_has_the_extremes_mean_and_rms_of_its_closed_form(make_m
     found = model.reduce(duration=0.4, transient=0, method=method, rtol=1e-10)["inner.x"]
     amplitude = abs(response)
     assert found.maximum == pytest.approx(offset + amplitude, rel=1e-8)
-    assert found.minimum == pytest.approx(offset - amplitude, rel=1e-8)
+    assert found.minimum == pytest.approx(offset - amplitude, rel=1e-8, abs=0.0)
     assert found.mean == pytest.approx(offset, rel=1e-7)
     assert found.rms == pytest.approx(math.sqrt(offset**2 + 0.5 * amplitude**2), rel=1e-7)
     for time, angle in ((found.maximum_time, 0.0), (found.minimum_time, math.pi)):
@@ -185,14 +185,14 @@ def test_a_small_vibration_about_a_large_offset_keeps_its_digits(make_model: Mod
     assert run.reductions is not None
     found = run.reductions["inner.x"]
     assert found.mean == pytest.approx(4e-6, rel=0.01)
-    assert found.std == pytest.approx(np.std(x - x[0]), rel=1e-4)
+    assert found.std == pytest.approx(np.std(x - x[0]), rel=1e-4, abs=0.0)
 
 
 def test_joined_stretches_keep_the_digits_of_their_deviation() -> None:
     both = joined(stretch(mean=1.0, std=3e-9, duration=1.0), stretch(mean=1.0 + 8e-9, std=3e-9, duration=1.0))
     assert both is not None
-    assert both["x"].std == pytest.approx(5e-9, rel=1e-6)
-    assert both["x"].mean == pytest.approx(1.0 + 4e-9, rel=1e-15)
+    assert both["x"].std == pytest.approx(5e-9, rel=1e-6, abs=0.0)
+    assert both["x"].mean == pytest.approx(1.0 + 4e-9, rel=1e-15, abs=0.0)
 
 
 def stretch(*, mean: float, std: float, duration: float) -> Reductions:

@@ -180,7 +180,7 @@ def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     state[4] = 2e-5  # right.inner.x
     place = locate_failure(pair, pair.numbers(), 0.0, state)
     assert (place.bearing, place.ball) == ("right", 1)
-    assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12)  # less half its clearance, Eq. (6)
+    assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12, abs=0.0)  # less half its clearance, Eq. (6)
     assert "ball 1 of right" in place.words
 
 
@@ -192,8 +192,8 @@ def test_a_static_quantity_is_of_the_bearing_it_names(pair: Model, alone: dict[s
         both = pair.sensitivity(asked, f"bearings.{name}.clearance", check=False)
         own = model.sensitivity([f"static_{kind}@240deg" for kind in kinds], "bearing.clearance", check=False)
         for mine, other in zip(both.pairs, own.pairs, strict=True):
-            assert mine.value == pytest.approx(other.value, rel=1e-9)
-            assert mine.derivative == pytest.approx(other.derivative, rel=1e-6)
+            assert mine.value == pytest.approx(other.value, rel=1e-9, abs=0.0)
+            assert mine.derivative == pytest.approx(other.derivative, rel=1e-6, abs=0.0)
         assert [item.ball for item in both.quantities] == [item.ball for item in own.quantities]
     with pytest.raises(RequestError, match="static_left_deflection or static_right_deflection"):
         pair.sensitivity("static_deflection@240deg", "bearings.left.clearance", check=False)
@@ -269,7 +269,7 @@ def test_bearings_on_a_shaft_carry_their_shares_of_its_load(
         for k, share in enumerate(shares):
             load = 196.0 * (1.0 if share is None else share)
             expected = alone.static_equilibrium(parameters={"load.force.x": load}).x[0]
-            assert found[2 * k] == pytest.approx(expected, rel=1e-9)
+            assert found[2 * k] == pytest.approx(expected, rel=1e-9, abs=0.0)
         assert sum("carries the whole load of the shaft" in limit for limit in model.explain().limits) == words
         unusual = " ".join(model.explain().unusual)
         assert ("whole load together" in unusual) == (shares == (0.25, 0.5))

@@ -63,10 +63,10 @@ def test_deflection_follows_the_two_thirds_power_of_the_load(bearing_6204: Model
     parameters = {"bearing.clearance": 0.0, "bearing.ball_angle": 0.1}
     at = [bearing_6204.static_equilibrium(parameters=parameters, load=(f, 0.0)) for f in (1e-3, 100.0, 8e5)]
     for one, force in zip(at, (1e-3, 100.0, 8e5), strict=True):
-        assert one.positions == pytest.approx(at[1].positions * (force / 100.0) ** (2 / 3), rel=1e-9)
+        assert one.positions == pytest.approx(at[1].positions * (force / 100.0) ** (2 / 3), rel=1e-9, abs=0.0)
     own = bearing_6204.static_equilibrium(parameters={**parameters, "load.force.x": 300.0, "load.force.y": 0.0})
     slope = own.derivative("positions", "load.force.x")
-    assert slope == pytest.approx(own.positions * (2 / 3) / 300.0, rel=1e-9)
+    assert slope == pytest.approx(own.positions * (2 / 3) / 300.0, rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize("clearance", [-8e-6, 0.0, 10e-6, 1e-3])
@@ -115,7 +115,7 @@ def test_crank_angle_and_time_name_the_same_instant(press: Model) -> None:
     speed = press.numbers().values["mechanism.driver.speed"]
     by_angle = press.static_equilibrium(crank_angle=math.radians(240.0))
     by_time = press.static_equilibrium(math.radians(240.0) / speed)
-    assert by_angle.positions == pytest.approx(by_time.positions, rel=1e-9)
+    assert by_angle.positions == pytest.approx(by_time.positions, rel=1e-9, abs=0.0)
     # largest force of the crank on the frame, half of it on this bearing
     assert by_angle.load[1] == pytest.approx(8487.1 / 2, rel=2e-5)
 
@@ -166,7 +166,7 @@ def test_one_loaded_ball_leaves_the_ring_free_sideways(bearing_6204: Model) -> N
     assert np.abs(found.free_directions) == pytest.approx(np.array([[0.0, 1.0]]), abs=1e-12)
     assert np.count_nonzero(found.ball_force) == 1
     k_b = bearing_6204.constants()["bearing.k_b"]
-    assert found["inner.x"] == pytest.approx(0.5e-3 + (1000.0 / k_b) ** (2 / 3), rel=1e-12)
+    assert found["inner.x"] == pytest.approx(0.5e-3 + (1000.0 / k_b) ** (2 / 3), rel=1e-12, abs=0.0)
     with pytest.raises(RequestError, match="free to move"):
         found.derivative("positions", "bearing.clearance")
 
