@@ -14,6 +14,7 @@ from ballpass.runtime.ask.life_report import _oscillation, life_report
 from ballpass.runtime.ask.wear import LoadSamples, wear_field
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import DutyInfo, LubricationInfo
+from ballpass.runtime.questions.life import life_figures
 from ballpass.runtime.ratings import groove_slip, life
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of
 from ballpass.runtime.ratings.readings import READINGS
@@ -53,6 +54,19 @@ def test_a_report_is_what_its_quantities_give_one_by_one(press: Model) -> None:
     assert bearing.hours(bearing.lives["sectors"]) == pytest.approx(bearing.lives["sectors"] / (500 * 60))
     assert max(map(len, str(report).splitlines())) <= 80
     assert repr(report).startswith("LifeReport(punching_press: 242")
+
+
+@pytest.mark.long
+def test_the_pressure_of_a_four_stroke_engine_is_drawn_over_both_turns(make_model: Callable[..., Model]) -> None:
+    """Whichever turn the run begins with, the gas force of the other one is in the picture."""
+    model = make_model("engine")
+    figure = dict(life_figures(model, model.life(cycles=8), {}))["pressure"]
+    (mesh,) = figure.axes[0].collections
+    pressure = mesh.get_array()
+    edges = np.linspace(*figure.axes[0].get_xlim(), pressure.shape[1] + 1)
+    assert edges[-1] - edges[0] == pytest.approx(720.0, rel=1e-3)
+    top = int(np.argmax(np.max(pressure, axis=0)))
+    assert 90.0 < edges[top] % 720.0 < 120.0  # the gas force is highest at 105 degrees of the first turn
 
 
 def test_too_few_turns_are_told(press: Model) -> None:

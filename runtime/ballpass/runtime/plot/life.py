@@ -56,12 +56,12 @@ def damage(title: str, bearing: BearingStrength) -> Figure:
 
 
 @styled
-def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, ring: str) -> Figure:
-    """Peak pressure of every ball's contact over a turn.
+def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, ring: str, turns: int) -> Figure:
+    """Peak pressure of every ball's contact over a turn, or over several of an engine's cycle.
 
     Parameters
     ----------
-    crank : angles of driver or shaft, increasing over a turn, shape (samples,) [rad]
+    crank : angles of driver or shaft, increasing over the turns, shape (samples,) [rad]
     found : shape (samples, balls) [Pa]
     """
     figure = new_figure(4.4)
@@ -74,13 +74,14 @@ def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, r
     figure.colorbar(mesh, ax=panel, label="peak pressure [MPa]")
     panel.set(xlabel="angle of driver or shaft [°]", ylabel=element.noun, yticks=range(1, balls + 1))
     panel.grid(visible=False)
+    name = "turn" if turns == 1 else f"{turns} turns"
     words = (
-        f"Peak pressure between each {element.noun} and the {ring} ring in the first turn after the transient; dark is "
+        f"Peak pressure between each {element.noun} and the {ring} ring in the first {name} after the transient; dark is "
         f"high. The static limit of ISO 76 is {element.static_pressure / 1e6:.0f} MPa; the highest pressure of all "
         f"turns is {bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and "
         f"{bearing.outer.peak_pressure / 1e6:.0f} MPa at the outer ring."
     )
-    caption(figure, f"{_titled(title, bearing)}: pressure over a turn", words)
+    caption(figure, f"{_titled(title, bearing)}: pressure over {'a turn' if turns == 1 else name}", words)
     return figure
 
 

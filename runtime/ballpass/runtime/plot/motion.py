@@ -107,7 +107,19 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         words = f"not to one scale: the path is\n{wide:.3g} µm wide and {high:.3g} µm high"
-        axes.text(0.98, 0.98, words, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=GREY)
+        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}  # paths pass behind the words
+        axes.text(
+            0.98,
+            0.98,
+            words,
+            transform=axes.transAxes,
+            ha="right",
+            va="top",
+            fontsize=8,
+            color=GREY,
+            bbox=paper,
+            zorder=6,
+        )
     if relative:
         around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 1e6 * record.radial_gap
         if radius > 0.0:

@@ -104,21 +104,23 @@ def life(
 def _pressure(
     model: AnyModel, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
 ) -> Figure:
-    """The ring with the higher pressure, over a turn after the transient."""
+    """The ring with the higher pressure, over a turn after the transient; an engine's over the turns of its cycle."""
     from ballpass.runtime.ask.wear import load_samples
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of
+    from ballpass.runtime.run.driver_angle import cycle_turns
     from ballpass.runtime.run.request import Request
     from ballpass.runtime.run.resolve import resolve
 
     numbers = model.numbers(overrides)
-    run = resolve(model, numbers, Request(cycles=model.run_settings.transient_cycles + 1.0))
+    turns = cycle_turns(numbers.values)
+    run = resolve(model, numbers, Request(cycles=model.run_settings.transient_cycles + turns))
     samples = load_samples(run)[info.prefix]
     inner, outer = contacts_of(info, numbers.values)
     ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
-    crank = np.unwrap(samples.crank)
+    crank = np.unwrap(samples.crank) + 2.0 * np.pi * (model.run_settings.transient_cycles % turns)
     found = contact.peak_pressure(samples.force)
-    return figures.pressure(title, bearing, crank, found, ring)
+    return figures.pressure(title, bearing, crank, found, ring, turns)
 
 
 def _clearance(
