@@ -76,8 +76,8 @@ def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, r
     panel.grid(visible=False)
     name = "turn" if turns == 1 else f"{turns} turns"
     words = (
-        f"Peak pressure between each {element.noun} and the {ring} ring in the first {name} after the transient; dark is "
-        f"high. The static limit of ISO 76 is {element.static_pressure / 1e6:.0f} MPa; the highest pressure of all "
+        f"Peak pressure between each {element.noun} and the {ring} ring in the first {name} after the transient; dark "
+        f"is high. The static limit of ISO 76 is {element.static_pressure / 1e6:.0f} MPa; the highest pressure of all "
         f"turns is {bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and "
         f"{bearing.outer.peak_pressure / 1e6:.0f} MPa at the outer ring."
     )
