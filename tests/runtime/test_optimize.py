@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pytest
+from scipy.optimize import rosen, rosen_der
 
 from ballpass.runtime import Model, QuantityFunction, RequestError
-from ballpass.runtime.ask.bundle import Plane, minimize_by_planes
+from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes
+from ballpass.runtime.ask.interior_point import minimize_by_ipopt
+
+Search = Callable[[Callable[[np.ndarray], Plane], np.ndarray], BundleMinimum]
+searches = pytest.mark.parametrize("minimized", [minimize_by_planes, minimize_by_ipopt])
 
 
 def _planes(*functions: Callable[[np.ndarray], tuple[float, np.ndarray]]) -> Callable[[np.ndarray], Plane]:
@@ -19,7 +25,8 @@ def _planes(*functions: Callable[[np.ndarray], tuple[float, np.ndarray]]) -> Cal
     return evaluate
 
 
-def test_a_kink_in_two_variables_is_hit_from_any_start() -> None:
+@searches
+def test_a_kink_in_two_variables_is_hit_from_any_start(minimized: Search) -> None:
     """The goal |x - 0.3| + 2 |y - 0.6|, least 0 at a corner of four smooth parts."""
 
     def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -27,13 +34,14 @@ def test_a_kink_in_two_variables_is_hit_from_any_start() -> None:
         return float(np.abs(away) @ [1.0, 2.0]), np.where(away >= 0.0, [1.0, 2.0], [-1.0, -2.0])
 
     for start in ([0.9, 0.1], [0.05, 0.95], [0.31, 0.2]):
-        found = minimize_by_planes(_planes(goal), np.array(start))
+        found = minimized(_planes(goal), np.array(start))
         assert found.best.x == pytest.approx([0.3, 0.6], abs=1e-6)
         assert len(found.sides) > 1
         assert found.converged
 
 
-def test_a_smooth_minimum_on_a_constraint_has_the_multiplier_of_lagrange() -> None:
+@searches
+def test_a_smooth_minimum_on_a_constraint_has_the_multiplier_of_lagrange(minimized: Search) -> None:
     """x^2 + y^2 with x + y >= 0.8: least at (0.4, 0.4); the goal is 0.32 there and grows by 0.8 of the limit."""
 
     def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -42,21 +50,45 @@ def test_a_smooth_minimum_on_a_constraint_has_the_multiplier_of_lagrange() -> No
     def limit(x: np.ndarray) -> tuple[float, np.ndarray]:
         return 0.8 - float(x.sum()), -np.ones(2)
 
-    found = minimize_by_planes(_planes(goal, limit), np.array([0.9, 0.2]))
+    found = minimized(_planes(goal, limit), np.array([0.9, 0.2]))
     assert found.best.values[0] == pytest.approx(0.32, abs=1e-6)
     assert found.best.x == pytest.approx([0.4, 0.4], abs=1e-3)
     assert found.multipliers == pytest.approx([0.8], abs=1e-2)
 
 
+def test_ipopt_takes_fewer_evaluations_in_a_curved_valley_of_four_variables() -> None:
+    """Rosenbrock's function, least 0 at (0.5, ...)."""
+
+    def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
+        return float(rosen(2.0 * x)) / 10.0, rosen_der(2.0 * x) / 5.0
+
+    start = np.array([0.05, 0.9, 0.3, 0.9])
+    ipopt, planes = (minimized(_planes(goal), start) for minimized in (minimize_by_ipopt, minimize_by_planes))
+    assert ipopt.best.values[0] < 0.1 * planes.best.values[0]
+    assert len(ipopt.trace) < len(planes.trace)
+
+
+def test_what_ends_an_evaluation_ends_ipopt() -> None:
+    def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
+        if x[0] != 0.9:
+            raise KeyboardInterrupt
+        return float(x @ x), 2.0 * x
+
+    with pytest.raises(KeyboardInterrupt):
+        minimize_by_ipopt(_planes(goal), np.array([0.9, 0.2]))
+
+
 @pytest.mark.long
+@pytest.mark.parametrize("search", ["planes", "ipopt"])
 def test_the_least_peak_of_the_press_over_housing_damping_is_the_kink_of_an_independent_program(
-    make_model: Callable[..., Model],
+    make_model: Callable[..., Model], search: Literal["planes", "ipopt"]
 ) -> None:
     found = make_model("punching_press").optimize(
         "peak_ball_force",
         "bearing.outer_ring.damping=1000 N*s/m:10000 N*s/m:log",
         cycles=4,
         transient=2,
+        search=search,
         starts=1,
     )
     assert found.value == pytest.approx(3685.164, abs=2e-3)

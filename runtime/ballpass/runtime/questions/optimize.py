@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
@@ -68,6 +68,13 @@ Tolerance = Annotated[
         shown="PATH=A:B",
         example='bearing.clearance="-2 um:2 um"',
         names=option_names.ranges(deviations=True),
+    ),
+]
+Search = Annotated[
+    Literal["planes", "ipopt"],
+    Option(
+        words="Tangent planes of several points at once; or IPOPT, for smooth goals of many parameters, and planes "
+        "from where it ends."
     ),
 ]
 Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
@@ -246,6 +253,7 @@ def optimize(
     *,
     subject_to: Limits = None,
     tolerance: Tolerance = None,
+    search: Search = "planes",
     starts: Starts = 3,
     transient: Transient = None,
     parameters: Mapping[str, float] | None = None,
@@ -280,6 +288,7 @@ def optimize(
     from scipy.stats.qmc import Halton
 
     from ballpass.runtime.ask.bundle import minimize_by_planes
+    from ballpass.runtime.ask.interior_point import minimize_by_ipopt
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.parameter_range import parameter_range
@@ -298,6 +307,7 @@ def optimize(
     limits = read_limits(model.manifest, "subject_to", _texts(subject_to))
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
     shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
+    minimized = minimize_by_ipopt if search == "ipopt" else minimize_by_planes
     with (
         kept_parts(keep, model, *worst.decides) as parts,
         shown("searching", progress) as tell,
@@ -308,7 +318,7 @@ def optimize(
         found = []
         for block in range(starts):
             at = CANDIDATES * block + int(np.argmin(merits[CANDIDATES * block : CANDIDATES * (block + 1)]))
-            found.append((shares[at], minimize_by_planes(lambda share: worst.plane(share, parts), shares[at])))
+            found.append((shares[at], minimized(lambda share: worst.plane(share, parts), shares[at])))
             if tell is not None:
                 tell((block + 1) / (starts + 1))
         least = min((one for _, one in found), key=lambda one: one.best.merit)
