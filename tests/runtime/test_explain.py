@@ -37,6 +37,21 @@ def test_an_edge_at_the_start_of_the_turn_counts_once(make_model: Callable[..., 
     assert [b.cause for b in said.breakpoints] == ["punch on", "punch off"]
 
 
+def test_an_engine_is_explained_over_the_two_turns_of_its_cycle_whichever_comes_first(
+    make_virtual: Callable[..., Model],
+) -> None:
+    """It fires at 90 degrees, in the second turn of a crank that starts at 180."""
+    engine = make_virtual("engine")
+    first, other = (engine.explain({"mechanism.driver.start_angle": math.radians(start)}) for start in (0.0, 180.0))
+    knots = [sorted(round(math.degrees(b.angle), 6) for b in said.breakpoints) for said in (first, other)]
+    rows = [f"mechanism.forces.gas.table.angle.{k}" for k in range(1, 29)]
+    assert knots == [sorted(round(math.degrees(engine.parameters[row]), 6) for row in rows)] * 2
+    for one, same in zip(first.scales, other.scales, strict=True):
+        assert math.degrees(one.angle) == pytest.approx(math.degrees(same.angle), abs=2.0)
+        assert one.acceleration == pytest.approx(same.acceleration, rel=0.02)
+    assert "Breakpoints of the first 2 turns" in str(other)
+
+
 def test_a_knot_of_a_table_is_named_in_the_scenes_words() -> None:
     assert [_knot(name) for name in ("force.punch_slope", "torque.my_brake_slope", "load.x_rate")] == [
         "knot of punch",

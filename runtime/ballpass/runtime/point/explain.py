@@ -41,7 +41,10 @@ MANY_OSCILLATIONS = 5000.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Breakpoint:
-    """A time of the first turn at which a load switches or a table has a knot: time [s], driver angle [rad], cause."""
+    """A time of the first turn, or of as many as loads repeat after, at which a load switches or a table has a knot.
+
+    Time [s], driver angle [rad], which counts over these turns, and cause.
+    """
 
     time: float
     angle: float
@@ -87,13 +90,14 @@ class Explanation(ShortRepr, Reported):
     ----------
     states, outputs : their names
     turn : time of a turn [s]; infinite where nothing turns
-    breakpoints : of the first turn (of the run where nothing turns)
+    breakpoints : of the first of these turns (of the run where nothing turns)
     smoothness : pairs of law and the manifest's word, which `ballpass.runtime.contract.smoothness.WORDS` explains
     scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without
         states
     unsupported : instants without equilibrium, whose rates are not known
     method, reason : the choice of ``auto``, and why
     unusual : sentences about numbers outside of their usual ranges
+    turns : after which all loads repeat, two for a four-stroke engine
 
     Examples
     --------
@@ -115,12 +119,14 @@ class Explanation(ShortRepr, Reported):
     reason: str
     unusual: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
+    turns: int = 1
 
     def _report(self) -> Report:
         where = "; ".join(f"{math.degrees(item.angle):.4g}° {item.cause}" for item in self.breakpoints) or "none"
+        first = "turn" if self.turns == 1 else f"{self.turns} turns"
         laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "none"
         parts: list[Words | ReportTable] = [
-            Marked("Breakpoints of the first turn", "head", f": {where}"),
+            Marked(f"Breakpoints of the first {first}", "head", f": {where}"),
             Marked("Smoothness of the contact laws", "head", f": {laws}"),
         ]
         right = (
@@ -165,6 +171,7 @@ class Explanation(ShortRepr, Reported):
                 for item in self.breakpoints
             ],
             "turn": self.turn,
+            "turns": self.turns,
             "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in self.smoothness],
             "time_scales": scales,
             "without_equilibrium": self.unsupported,
@@ -188,13 +195,15 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     values = numbers.values
     manifest = model.manifest
     turn = driver_angle.period(manifest, values)
-    span = turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
+    turns = driver_angle.cycle_turns(values)
+    span = turns * turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
     scales, unsupported = _time_scales(model, parameters, span) if model.states else ((), ())
     method, reason = _method(model, scales, turn)
     return Explanation(
         states=model.states,
         outputs=model.outputs,
         turn=turn,
+        turns=turns,
         breakpoints=_breakpoints(model, values, span),
         smoothness=manifest.smoothness,
         scales=scales,
@@ -218,9 +227,18 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -
             for item, a, b in zip(inputs, before, behind, strict=True)
             if a != b and item.kind in ("gate", "table_rate")
         )
-        angle = driver_angle.crank_angle(model.manifest, values, float(time))
+        angle = _angle(model, values, float(time))
         found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
     return tuple(found)
+
+
+def _angle(model: LoadedModel, values: Mapping[str, float], time: float) -> float:
+    """Angle of driver or shaft within the turns after which loads repeat [rad]."""
+    angle, turns = driver_angle.crank_angle(model.manifest, values, time), driver_angle.cycle_turns(values)
+    if turns == 1 or model.manifest.mechanism is None or model.manifest.mechanism.angle:
+        return angle
+    whole = values[model.manifest.mechanism.start_angle] + driver_angle.shaft_speed(model.manifest, values) * time
+    return angle + driver_angle.TURN * (round((whole - angle) / driver_angle.TURN) % turns)
 
 
 def _knot(slope: str) -> str:
@@ -259,7 +277,7 @@ def _time_scales(
         instants = (("at rest under the load", 0),)
     for name, k in instants:
         time = float(times[k])
-        angle = driver_angle.crank_angle(model.manifest, values, time)
+        angle = _angle(model, values, time)
         try:
             x = static_equilibrium(model, numbers, t=time, load=None).x if model.manifest.bearings else rest
         except BallpassError as fault:
