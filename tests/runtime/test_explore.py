@@ -258,6 +258,25 @@ def test_pages_of_further_machines_give_native_peaks(
 @needs_browser
 @needs_compiler
 @pytest.mark.long
+@pytest.mark.parametrize("scene", ["punching_press", "punching_press_motor"])
+def test_a_load_that_rises_is_drawn_as_large_as_it_is(
+    make_model: Callable[..., Model], browser: Page, tmp_path: Path, scene: str
+) -> None:
+    """Whether the driver's angle is known before the run or a state."""
+    model = make_model(scene, ('end = "267 deg" }', 'end = "267 deg", rise = "10 deg" }'))
+    browser.open(model.explore(tmp_path / "page.html"))
+    browser.wait(DONE)
+    both = browser.value(
+        "[numbers, data].map((own) => own.linkage.forces.find((force) => force.name === 'force.punch').y)"
+    )
+    native, solved = (_at(one, ())[0] for one in both)
+    assert np.count_nonzero((native > 100.0) & (native < 8800.0)) > 20  # it is on its way there
+    assert np.max(np.abs(native - solved)) < 2.0
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
 def test_work_and_spectrum_of_a_run_that_ends_within_a_turn_are_those_of_whole_turns(
     make_model: Callable[..., Model], browser: Page, tmp_path: Path
 ) -> None:

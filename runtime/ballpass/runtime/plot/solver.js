@@ -178,6 +178,12 @@ function interpolated(angle, knots, heights, period) {
   return heights[n - 1] + (heights[n % knots.length] - heights[n - 1]) * (turned - a) / (b - a);
 }
 
+// Share of a load that rises behind the start of its window and falls before its end.
+function risen(angle, start, end, rise) {
+  const [past, width] = [angle - start, end - start].map((turned) => (turned % TURN + TURN) % TURN);
+  return Math.max(Math.min(past / rise, (width - past) / rise, 1), 0);
+}
+
 function forceOf(run, source, row, placeOf) {
   const value = (place) => run.known[place];
   if (source.columns) return source.columns.map((column) => source.sign * row[column]);
@@ -188,11 +194,12 @@ function forceOf(run, source, row, placeOf) {
   let amount = 1;
   if (source.input !== undefined) amount = row[inputsAt + source.input];
   else if (source.borders) amount = Number(source.borders.some((edges) => between(angleOf(run, row), edges.map(value))));
+  else if (source.rise) amount = risen(angleOf(run, row), ...source.rise.map(value));
   else if (source.table) amount = interpolated(angleOf(run, row), ...source.table.map((places) => places.map(value)), TURN * source.turns);
   if (amount === 0) return [0, 0];
-  if (source.cartesian) return source.cartesian.map(value);
-  const [size, direction] = source.polar ? source.polar.map(value) : [amount, value(source.direction)];
-  return [size * Math.cos(direction), size * Math.sin(direction)];
+  if (source.cartesian) return source.cartesian.map((place) => amount * value(place));
+  const [size, direction] = source.polar ? source.polar.map(value) : [1, value(source.direction)];
+  return [amount * size * Math.cos(direction), amount * size * Math.sin(direction)];
 }
 
 function loadOf(run, { load, force, cage, cosine }, row) {

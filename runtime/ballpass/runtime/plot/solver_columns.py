@@ -116,8 +116,11 @@ def _applied(record: Record, name: str, given: str, place: Mapping[str, int]) ->
         found["input"] = inputs.index(given)
     elif given:  # the driver's angle is a state
         borders = [item.windows[0] for item in manifest.inputs if item.name.startswith(f"border.{name}.")]
+        window = f"mechanism.forces.{name}.window"
         if borders:
             found["borders"] = [[place[start], place[end]] for start, end in borders]
+        elif f"{window}.rise" in place:
+            found["rise"] = [place[f"{window}.{key}"] for key in ("start", "end", "rise")]
         else:
             columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
             found["table"] = [[k for known, k in place.items() if known.startswith(one)] for one in columns]
