@@ -37,6 +37,7 @@ SHORT, LONG = (
     ("varying_compliance", "punching_press_tangent", "punching_press_roller", "four_bar", "offset_slider"),
 )
 MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
+OUTPUTS = 'outputs = ["inner.*", "ball.*", "load.*"]'
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
 
 pytestmark = pytest.mark.skipif(
@@ -115,6 +116,14 @@ def test_program_prints_the_numbers_of_the_model_and_compiles_without_warnings(
     names, expected = all_columns(solution)
     assert header == ",".join(names)
     assert np.array_equal(program.columns(), expected)
+
+
+@pytest.mark.parametrize("outputs", ["ball.force", pytest.param("inner.y", marks=pytest.mark.long)])
+def test_a_scene_of_one_output_or_of_states_alone_is_exported(exported: Callable[..., Program], outputs: str) -> None:
+    program = exported("varying_compliance", (OUTPUTS, f'outputs = ["{outputs}"]'))
+    assert program.messages == ""
+    found = program.columns("--cycles", "2")
+    assert np.array_equal(found, all_columns(program.model.simulate(method="stepper", cycles=2))[1])
 
 
 def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:

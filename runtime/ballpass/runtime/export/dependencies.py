@@ -38,7 +38,7 @@ def rates_and_outputs(model: LoadedModel) -> tuple[dict[str, casadi.SX], casadi.
     sizes = {"t": 1, "x": len(manifest.states), "u": len(manifest.inputs)}
     sizes |= {"p": len(manifest.parameters), "c": len(manifest.constants)}
     moment = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
-    functions = [model.symbolic("rhs"), *([outputs_function(model)] if computed_outputs(manifest) else ())]
+    functions = [model.symbolic("rhs"), outputs_function(model)]
     results = [function(*(moment[name] for name in function.name_in())) for function in functions]
     return moment, casadi.vertcat(*(casadi.densify(result) for result in results))
 

@@ -177,15 +177,11 @@ def _interface(model: LoadedModel) -> dict[str, str]:
     constants, moved = _tangents(model)
     along = tuple((f"const double *d{name}", f"d{name}") for name in "txupc")
     own = (("const double *p", "p"), ("const double *dp", "dp"))
-    if model.manifest.constants:
-        text = behind("Derivatives of the derived constants", constants, "scene_constants_tangent", own, "dc")
-    else:
-        unused = "".join(f"    (void){name};\n" for name in ("p", "dp", "dc"))
-        given = "const double *p, const double *dp, double *dc"
-        text = f"{NOTE}\nvoid scene_constants_tangent({given})\n{{\n{unused}}}\n"
     return texts | {
         "rates.c": behind("The states' derivatives", model.symbolic("rhs"), "scene_rates", MOMENT, "rates"),
-        "constants_tangent.c": text,
+        "constants_tangent.c": behind(
+            "Derivatives of the derived constants", constants, "scene_constants_tangent", own, "dc"
+        ),
         "tangent.c": behind("Derivatives of rates and outputs", moved, "scene_tangent", MOMENT + along, "moved"),
     }
 

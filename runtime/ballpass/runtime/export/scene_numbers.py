@@ -196,21 +196,13 @@ def _inputs(inputs: Sequence[InputInfo], place: dict[str, int]) -> tuple[list[st
 
 
 def constants_source(model: LoadedModel) -> str:
-    """C of ``constants``; of nothing where there are none."""
-    if not model.manifest.constants:
-        body = "{\n    (void)p;\n    (void)c;\n}"
-        return f'{NOTE}\n#include "scene.h"\n\nvoid scene_constants(const double *p, double *c)\n{body}\n'
+    """C of ``constants``."""
     given = (("const double *p", "p"),)
     return behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
 
 
 def outputs_source(model: LoadedModel) -> str:
-    """C of the outputs that are no states; of nothing where there are none."""
-    wanted = [info.name for info in computed_outputs(model.manifest)]
-    if not wanted:
-        body = "{\n    (void)t;\n    (void)x;\n    (void)u;\n    (void)p;\n    (void)c;\n    (void)y;\n}"
-        given = "double t, const double *x, const double *u, const double *p, const double *c, double *y"
-        return f'{NOTE}\n#include "scene.h"\n\nvoid scene_outputs({given})\n{body}\n'
+    """C of the outputs that are no states."""
     return behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y")
 
 
@@ -218,8 +210,9 @@ def outputs_function(model: LoadedModel) -> casadi.Function:
     """Outputs that are no states, one below the other, over t, x, u, p and c."""
     graph = model.symbolic("outputs")
     arguments = dict(zip(graph.name_in(), graph.sx_in(), strict=True))
-    results = dict(zip((info.name for info in model.manifest.outputs), graph(*arguments.values()), strict=True))
-    rows = casadi.vertcat(*(casadi.densify(results[info.name]) for info in computed_outputs(model.manifest)))
+    results = dict(zip((info.name for info in model.manifest.outputs), graph.call([*arguments.values()]), strict=True))
+    computed = (casadi.densify(results[info.name]) for info in computed_outputs(model.manifest))
+    rows = casadi.vertcat(casadi.SX(0, 1), *computed)
     return casadi.Function("outputs", [*arguments.values()], [rows], [*arguments], ["y"])
 
 
