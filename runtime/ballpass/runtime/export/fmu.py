@@ -40,10 +40,10 @@ from ballpass.runtime.export.model_description import (
 )
 from ballpass.runtime.export.scene_numbers import (
     MOMENT,
-    NOTE,
     behind,
     computed_outputs,
     driven,
+    filled,
     speed_table,
     varying,
 )
@@ -224,16 +224,16 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
     speeds, times = speed_table(manifest) if SPEED in inputs else ((), ())
     names = [info.name for info in manifest.parameters]
     table = ", ".join(str(names.index(name)) for name in (*speeds, *times)) or "0"
-    return (
-        f"{NOTE}\n#ifndef FMU_H\n#define FMU_H\n\n"
-        f'#define FMU_TOKEN "{token}"\n\n'
-        f"enum {{ FMU_OUTPUTS = {len(ends)}, FMU_STARTS_AT_ZERO = {int(given)} }};\n\n"
-        "/* Whether the driver's speed is an input; then the parameters whose place it takes: speeds, times. */\n"
-        f"enum {{ FMU_DRIVEN = {int(SPEED in inputs)}, FMU_SPEEDS = {len(speeds)}, "
-        f"FMU_TABLE = {len(speeds) + len(times)} }};\n"
-        f"static const int fmu_table[] = {{{table}}};\n\n"
-        "/* Where the numbers of each output begin, and those of the last end. */\n"
-        f"static const int fmu_outputs[] = {{{', '.join(map(str, (0, *ends)))}}};\n\n#endif\n"
+    return filled(
+        FMI / "fmu.h.in",
+        TOKEN=token,
+        OUTPUTS=str(len(ends)),
+        ZERO=str(int(given)),
+        DRIVEN=str(int(SPEED in inputs)),
+        SPEEDS=str(len(speeds)),
+        TABLE=str(len(speeds) + len(times)),
+        PLACES=table,
+        ENDS=", ".join(map(str, (0, *ends))),
     )
 
 
@@ -268,13 +268,10 @@ def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
     parameters = [(info.name, info.unit, info.description) for info in manifest.parameters if info.name not in gone]
     parameters += [(SPEED, "rad/s", "Speed of the driver")] if SPEED in inputs else []
     outputs = [(info.name, info.unit, info.description) for info in manifest.outputs]
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{html.escape(manifest.title)}</title>'
-        f"</head>\n<body>\n<h1>{html.escape(manifest.title)}</h1>\n"
-        "<p>Co-simulation by FMI 3.0, written by ballpass. All numbers are SI. Steps are chosen by an error control "
-        "relative to the magnitudes of the run from start to stop time: give both, and the tolerance. How often "
-        "the importer steps does not change the motion, unless an input changes; inputs hold until the next step.</p>\n"
-        f"<h2>Inputs</h2>\n{rows([row for row in parameters if row[0] in inputs])}\n"
-        f"<h2>Outputs</h2>\n{rows(outputs)}\n"
-        f"<h2>Parameters</h2>\n{rows([row for row in parameters if row[0] not in inputs])}\n</body>\n</html>\n"
+    return filled(
+        FMI / "index.html.in",
+        TITLE=html.escape(manifest.title),
+        INPUTS=rows([row for row in parameters if row[0] in inputs]),
+        OUTPUTS=rows(outputs),
+        PARAMETERS=rows([row for row in parameters if row[0] not in inputs]),
     )

@@ -49,29 +49,7 @@ _CYCLE = cycler(
     linestyle=["-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))] * 5,
 )
 
-_SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # ships with matplotlib: the same letters on every machine
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#495057",
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#e3e6ea",
-    "grid.linewidth": 0.7,
-    "xtick.color": "#343a40",
-    "ytick.color": "#343a40",
-    "legend.frameon": False,
-    "legend.fontsize": 9,
-    "hatch.linewidth": 0.7,
-    "axes.labelpad": 6.0,
-    "figure.constrained_layout.w_pad": 0.12,
-    "figure.constrained_layout.h_pad": 0.08,
-    "svg.hashsalt": "ballpass",
-}
+_SETTINGS = matplotlib.rc_params_from_file(Path(__file__).with_name("figures.mplstyle"), use_default_template=False)
 
 #: Kinds of files, and settings by which their bytes depend on the drawing alone: no date, no version.
 _METADATA: dict[str, dict[str, Any]] = {

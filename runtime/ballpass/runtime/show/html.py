@@ -7,34 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from html import escape
-
-#: Colours come from the notebook; rules and heads are translucent, so that they fit both a light and a dark page.
-_STYLE = """
-.ballpass { font-size: 0.92em; line-height: 1.4; margin: 0.3em 0; }
-.ballpass .scroll { overflow-x: auto; max-width: 100%; }
-.ballpass .formula { display: block; overflow-y: hidden; padding: 0.2em 0; }
-.ballpass table { border-collapse: collapse; margin: 0.3em 0 0.6em; }
-.ballpass table th, .ballpass table td { text-align: left !important; vertical-align: top; border: 0; }
-.ballpass table th, .ballpass table td { padding: 0.15em 0.8em 0.15em 0; }
-.ballpass table thead th { border-bottom: 1px solid rgba(128, 128, 128, 0.6); vertical-align: bottom; }
-.ballpass table .number { text-align: right !important; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.ballpass table td:last-child:not(.number) { min-width: 16em; }
-.ballpass .title { font-weight: 600; }
-.ballpass .note { opacity: 0.75; }
-.ballpass p { margin: 0.2em 0; }
-.ballpass summary { cursor: pointer; font-weight: 600; }
-.ballpass math { font-size: 1.1em; }
-.ballpass .good { color: #2e8b57; }
-.ballpass .bad { color: #d1495b; font-weight: 600; }
-.ballpass .doubt { color: #b7791f; }
-.ballpass .faint { opacity: 0.75; }
-.ballpass .head { font-style: italic; }
-"""
+from importlib.resources import files
 
 
 def block(*parts: str) -> str:
     """Parts, HTML already, as one output of a notebook."""
-    return f'<div class="ballpass"><style>{_STYLE}</style>{"".join(parts)}</div>'
+    style = (files(__package__) / "notebook.css").read_text(encoding="utf-8")
+    return f'<div class="ballpass"><style>{style}</style>{"".join(parts)}</div>'
 
 
 def framed_page(page: str) -> str:
