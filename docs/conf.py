@@ -49,6 +49,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "first_notebook_cell": "%matplotlib inline",
     "min_reported_time": 1000,
+    "write_computation_times": False,  # a page that takes scripts from elsewhere
     "remove_config_comments": True,
     "reset_modules": ("matplotlib", "ballpass.runtime.plot.style.use"),
 }
