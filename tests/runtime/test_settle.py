@@ -71,11 +71,11 @@ def test_run_says_what_more_turns_change_and_settles_on_request(
 
     shown = run("--set", f"{ANGLE}=15 deg").stdout
     assert "Over 64 steady turns: highest ball force 4404 N instead of 4082" in shown
-    assert "2 steady ones" in shown
+    assert "steady turns: 2" in shown
     assert "highest ball force 4404 N as before;" in run("--cycles", "25").stdout
     settled = run("--turns", "settle", "--set", f"{ANGLE}=15 deg").stdout
     assert "settled over 128 steady turns" in settled
-    assert "128 steady ones" in " ".join(settled.split())
+    assert "steady turns: 128" in " ".join(settled.split())
     summary = json.loads(run("--turns", "settle", "--json").stdout)
     assert summary["peak_ball_force"]["total"] == pytest.approx(LONG_PEAK, rel=1e-3)
     assert summary["inner.x"]["min"] == summary["longer"]["inner.x"]["min"]

@@ -158,7 +158,7 @@ def test_table_fits_a_terminal_and_shows_micrometres(press: tuple[Model, Solutio
     row = next(line for line in text.splitlines() if line.split()[:3] == ["Inner", "ring,", "y"])
     assert float(row.split()[4]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
     assert row.split()[-1] == "µm"
-    assert "2 transient cycles" in " ".join(text.split())
+    assert "transient turns left out: 2" in " ".join(text.split())
     assert "one-sided" in text
 
 

@@ -6,12 +6,12 @@ In: what `summarize` gave.  Out: tables of a report.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.summary_words import row_place, row_words, written
 from ballpass.runtime.contract.units import table_unit
-from ballpass.runtime.quantity.grammar import parse_quantity
+from ballpass.runtime.quantity.grammar import parse_quantity, quantity_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import ReportTable
 
@@ -33,10 +33,10 @@ _RUN = {
     "steps": "{} steps",
     "located_kinks": "{} kinks located",
     "wall_time": "integrated in {} s",
-    "cycle_length": "cycle {} s",
-    "transient_cycles_dropped": "{} transient cycles dropped",
-    "steady_cycles": "{} steady ones",
-    "samples": "{} steady samples",
+    "cycle_length": "a turn takes {} s",
+    "transient_cycles_dropped": "transient turns left out: {}",
+    "steady_cycles": "steady turns: {}",
+    "samples": "their samples: {}",
     "growth": "a start moved by the tolerance changes results by {}",
 }
 
@@ -121,7 +121,7 @@ def _of_run(key: str, value: float) -> str:
     return str(value) if isinstance(value, int) else rounded(value)
 
 
-def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
+def render_quantities(manifest: Manifest, found: Mapping[str, QuantityValue]) -> ReportTable:
     """Quantities of ``--of``."""
     rows = []
     for name, one in found.items():
@@ -129,7 +129,13 @@ def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
         time = "" if one.time is None else f"t = {one.time:.6g} s"
         ball = "" if one.ball is None else f"ball {one.ball}"
         rows.append((name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
-    return ReportTable(title="Quantities", heads=("quantity", "value", "unit", "at"), rows=rows, right=("value",))
+    heads, caption = ("quantity", "value", "unit", "at"), _quantities_words(manifest, found)
+    return ReportTable(title="Quantities", heads=heads, rows=rows, right=("value",), caption=caption)
+
+
+def _quantities_words(manifest: Manifest, names: Iterable[str]) -> str:
+    """What each quantity is, a line each."""
+    return "\n".join(f"{name}: {quantity_words(manifest, parse_quantity(manifest, name))}" for name in names)
 
 
 def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
@@ -144,7 +150,11 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
         rows.append((name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit))
     right = ("value", "estimated error")
     return ReportTable(
-        title="Extremes between samples included", heads=("quantity", *right, "unit"), rows=rows, right=right
+        title="Extremes between samples included",
+        heads=("quantity", *right, "unit"),
+        rows=rows,
+        right=right,
+        caption=_quantities_words(model.manifest, accuracy.of),
     )
 
 

@@ -149,7 +149,8 @@ def _state_parts(state: StateStrength) -> _Parts:
     parts.append("")  # behind a table there is one
     for bearing in state.bearings:
         parts += _bearing_parts(bearing)
-    return [*parts, f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis."]
+    what = "Wear and P" if any(bearing.lives for bearing in state.bearings) else "Wear"
+    return [*parts, f"  {what}: means of {state.samples} samples; angles from each ring's x axis."]
 
 
 def _bearing_parts(bearing: BearingStrength) -> _Parts:

@@ -256,7 +256,7 @@ def run(
     if left_out:
         show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
     if asked_for and solution.accuracy is None:
-        show_parts(render_quantities(asked_for))
+        show_parts(render_quantities(model.manifest, asked_for))
     if turned:
         show_parts(turned)
     if solution.accuracy is not None:
