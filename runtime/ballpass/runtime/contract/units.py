@@ -368,6 +368,8 @@ _UNITS: dict[str, tuple[int, dict[str, int]]] = {
     "s": (1, {"second": 1}),
     "N": (1000, {"gram": 1, "meter": 1, "second": -2}),
     "Pa": (1000, {"gram": 1, "meter": -1, "second": -2}),
+    "J": (1000, {"gram": 1, "meter": 2, "second": -2}),
+    "W": (1000, {"gram": 1, "meter": 2, "second": -3}),
     "Hz": (1, {"second": -1}),
     "rad": (1, {"radian": 1}),
     "K": (1, {"kelvin": 1}),

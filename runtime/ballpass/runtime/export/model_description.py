@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from fractions import Fraction
 from itertools import chain
 from xml.etree import ElementTree as Xml
 
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.units import unit_size
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies
@@ -24,16 +24,8 @@ from ballpass.runtime.run.driver_angle import period
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"
 
-#: Units as products of powers of the base units.
-_UNITS = {
-    **{name: {name: 1} for name in ("m", "kg", "s", "rad")},
-    "1": {},
-    "Hz": {"s": -1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-}
+#: Base units of the standard, by our names.
+_BASE = {"gram": "kg", "meter": "m", "second": "s", "radian": "rad"}
 
 #: A name of the standard's structured naming convention.
 _STRUCTURED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
@@ -104,21 +96,15 @@ def _units(root: Xml.Element, manifest: Manifest) -> None:
         unit = Xml.SubElement(place, "Unit", name=name)
         powers = base_powers(name)
         if powers is not None:
-            Xml.SubElement(unit, "BaseUnit", {base: str(power) for base, power in powers.items() if power})
+            Xml.SubElement(unit, "BaseUnit", {base: str(power) for base, power in powers.items()})
 
 
 def base_powers(unit: str) -> dict[str, int] | None:
-    """Powers of the base units in a unit such as ``N*s/m``; None where one is no whole number."""
-    powers: dict[str, Fraction] = {}
-    for sign, factor, power in re.findall(r"(^|[*/])\(?([A-Za-z1]+)(?:\^(-?[\d.]+))?", unit):
-        if factor not in _UNITS:
-            return None
-        times = Fraction(power or "1") * (-1 if sign == "/" else 1)
-        for base, exponent in _UNITS[factor].items():
-            powers[base] = powers.get(base, Fraction(0)) + exponent * times
-    if "(" in unit or any(power.denominator != 1 for power in powers.values()):
+    """Powers of the base units in an SI unit such as ``N*s/m``; None where one is no whole number."""
+    powers = unit_size(unit).base
+    if any(power.denominator != 1 for _, power in powers):
         return None
-    return {base: int(power) for base, power in powers.items()}
+    return {_BASE[name]: int(power) for name, power in powers}
 
 
 def _rate_unit(unit: str) -> str:

@@ -148,11 +148,7 @@ def _band(flag: str, text: str, option: Option) -> tuple[float, float]:
     edges = text.split(":")
     if len(edges) != 2:
         raise RequestError(f"{flag}: {text!r} is no band. Allowed: {option.shown}, as {option.example}.")
-    digits = [edge.strip().rstrip("kMHz ") for edge in edges]
-    low, high = (
-        read_value(flag, f"{number} {edge.strip()[len(number) :].strip()}", option.unit)
-        for number, edge in zip(digits, edges, strict=True)
-    )
+    low, high = (read_value(flag, edge.strip(), option.unit) for edge in edges)
     return low, high
 
 
