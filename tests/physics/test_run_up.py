@@ -26,6 +26,7 @@ table.speed = { file = "run.csv", column = "n", unit = "rpm" }
 ROWS = "time, n\n0.02, 60\n0.3, 600\n0.5, 450\n0.8, -300\n"
 TIMES, SPEEDS = np.array([0.02, 0.3, 0.5, 0.8]), np.array([60.0, 600.0, 450.0, -300.0]) * math.pi / 30.0
 END, START_ANGLE, PUNCH = 0.9, 0.4, "mechanism.forces.punch.force.y"
+OUTPUTS = '"driver.*", "drive_*", "reaction.*"'
 NAMES = [f"mechanism.driver.table.{column}.{row}" for column in ("time", "speed") for row in (1, 2, 3, 4)]
 
 
@@ -35,14 +36,13 @@ def angle(time: float, times: np.ndarray = TIMES, speeds: np.ndarray = SPEEDS) -
     return START_ANGLE + float(np.trapezoid(np.interp(edges, times, speeds), edges))
 
 
-def _model(folder: Path, *changes: tuple[str, str]) -> Model:
+def _model(folder: Path, *changes: tuple[str, str], outputs: str = OUTPUTS) -> Model:
     """The press of the paper without its bearing."""
     head = PRESS[: PRESS.index("[bearing]")]
     for old, new in ((SPEED, TABLE), ('start_angle = "0 deg"', 'start_angle = "0.4 rad"'), *changes):
         assert old in head
         head = head.replace(old, new)
     (folder / "run.csv").write_text(ROWS)
-    outputs = '"driver.*", "drive_*", "reaction.*"'
     (folder / "press.toml").write_text(f'{head}\n[run]\nduration = "{END} s"\noutputs = [{outputs}]\n')
     return load(generate(folder / "press.toml", folder / "model"))
 
@@ -132,3 +132,35 @@ def test_tables_of_speed_that_say_nothing_are_refused(keys: str, words: str) -> 
 def test_a_run_begins_at_the_start_of_its_table(press: Model) -> None:
     with pytest.raises(RequestError, match="its table has"):
         press.simulate(duration=0.1, initial=[0.0, 10.0])
+
+
+def test_extremes_at_a_windows_edge_are_values_on_one_of_its_sides(press: Model) -> None:
+    """Reactions jump there; a parabola through both sides went an eighth of the jump beyond."""
+    run = press.simulate(times=np.linspace(0.0, END, 100_001), duration=END, rtol=1e-10)
+    for name in ("reaction.A.y", "reaction.B.y", "reaction.C.y", "drive_torque"):
+        found = press.quantities([f"{kind}:{name}" for kind in ("max", "min")], duration=END, transient=0)
+        extremes = [one.value for one in found.values()]
+        assert extremes == pytest.approx([np.max(run[name]), np.min(run[name])], abs=1e-3 * float(np.ptp(run[name])))
+
+
+@pytest.mark.parametrize("window", [True, False])
+def test_work_of_a_stop_is_that_of_fine_samples_where_steps_take_turns(tmp_path: Path, window: bool) -> None:
+    """A speed that is linear in time lets steps be as long as the stretch between two rows."""
+    wall = """[mechanism.stops.wall]
+bodies = ["frame", "slider"]
+points = ["A", "C"]
+direction = "270 deg"
+stiffness = "2e6 N/m"
+free_distance = "97 mm"
+hysteresis = "1 s/m"
+
+[mechanism.forces.punch]"""
+    changes = [("[mechanism.forces.punch]", wall)]
+    if not window:
+        changes.append(('window = { start = "237 deg", end = "267 deg" }\n', ""))
+    model = _model(tmp_path, *changes, outputs='"stop.wall.*", "stop.wall.power"')
+    run = model.simulate(times=np.linspace(0.0, END, 400_001), duration=END, rtol=1e-10)
+    for name in ("stop.wall.power", "stop.wall.force"):
+        found = model.quantities(f"integral:{name}", duration=END, transient=0, rtol=1e-7)[f"integral:{name}"]
+        samples = float(np.trapezoid(run[name], run.t))
+        assert found.value == pytest.approx(samples, rel=1e-6)

@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 #: Points of a grid, and how often it is refined: 1e-4 of a turn becomes 1e-8 of it.
 GRID, ROUNDS = 65, 2
 
+#: Most that a smooth extreme lies beyond the best point of its grid, over the range of values there [1].
+SMOOTH = 1e-2
+
 #: Extremes nearer to each other than this share of the run are one.
 APART = 1e-9
 
@@ -209,7 +212,10 @@ def _extreme(bracket: _Bracket, edges: Edges) -> Extreme:
     low, mid, high = (float(value) for value in found[k - 1 : k + 2, column])
     bend = low - 2.0 * mid + high
     shift = 0.5 * (low - high) / bend if bend != 0.0 else math.inf
-    return at(result.time + shift * step, mid + 0.25 * (high - low) * shift) if abs(shift) <= 1.0 else result
+    higher = 0.25 * (high - low) * shift
+    # a parabola within the whole grid rises by 1/4096 of it there; across a jump it would by an eighth
+    smooth = abs(shift) <= 1.0 and abs(higher) <= SMOOTH * float(np.ptp(found[:, column]))
+    return at(result.time + shift * step, mid + higher) if smooth else result
 
 
 def _crossing(

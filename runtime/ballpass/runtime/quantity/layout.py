@@ -27,7 +27,7 @@ from ballpass.runtime.quantity.panels import (
     Panels,
     cut_at,
     interpolated,
-    panels_between,
+    panels_of_steps,
     parts_needed,
     plan_of,
     split,
@@ -159,7 +159,7 @@ class NodeLayer:
                 found.append(here)
                 continue
             kinks = (kept[:, 1] > 0.0) & sort.graded
-            steps = panels_between(here.edges, kept[:, 0], kinks)
+            steps = panels_of_steps(here.edges, kept[:, 0], kinks, run.turn)
             here = self._along(run, here, uniform_panels(here.edges, run.turn) if sort.still else steps)
             found += self._refined(run, here, kinks)
         return [self._with_extremes(run, one, row) for one in found]
@@ -174,22 +174,24 @@ class NodeLayer:
 
     def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
         """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
-        assert layout.panels is not None
         assert layout.track is not None
-        passages = find_passages(run, layout.track) if not layout.still else layout.passages
-        edges = layout.edges
-        if passages.edges:
-            edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
+        if not layout.still and not layout.passages.edges:
+            # an extreme where a load begins moves with it, so that extremes need passages as well
+            passages = find_passages(run, layout.track)
+            if passages.edges:
+                edges = with_passages(layout.edges, passages.times, np.zeros((len(passages.times), 0)))
+                panels = panels_of_steps(edges, layout.kept[:, 0], kinks, run.turn)
+                layout = self._along(run, replace(layout, edges=edges, passages=passages), panels)
+        assert layout.panels is not None
         each = []
         for item in layout.items:
-            # an extreme where a load begins moves with it, so that extremes need passages as well
-            panels = panels_between(edges, layout.kept[:, 0], kinks) if passages.edges else layout.panels
+            panels = layout.panels
             if not self._is_found(item):
-                panels = panels if passages.edges else split(panels, self._parts(layout, item))
-                panels = cut_at(panels, edges, self._kinks(run, layout, item))
+                panels = split(panels, self._parts(layout, item))
+                panels = cut_at(panels, layout.edges, self._kinks(run, layout, item))
             each.append((item, panels))
         found = []
-        for here in self._each_along(run, replace(layout, edges=edges, passages=passages), each):
+        for here in self._each_along(run, layout, each):
             # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
             again = layout.still and passes > 1 and here.panels is not layout.panels
             found += self._refined(run, here, kinks, passes - 1) if again else self._ranked(run, here)
@@ -236,7 +238,9 @@ class NodeLayer:
         """Times of kinks of an integrated channel, beside those on which steps end [s]."""
         # a corner of the damping at rest is in the force of each ball, and not in the motion
         corner = _is_of_balls(item) and any(bearing.damping.corner_at_rest for bearing in self.model.manifest.bearings)
-        if not self._is_kinked(item) or not self._deflections.channels or not (corner or run.kinks != LOCATED):
+        # a step as long as a turn meets a stop and leaves it, and shows neither
+        known = run.kinks == LOCATED and not corner and not self.model.manifest.stops
+        if not self._is_kinked(item) or not self._deflections.channels or known:
             return np.zeros(0)
         assert layout.track is not None
         values, rates = self._deflections.with_rates(layout.track, run.numbers)

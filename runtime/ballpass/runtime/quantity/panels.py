@@ -110,6 +110,23 @@ def uniform_panels(edges: Edges, turn: float) -> Panels:
     return split(_spans(whole, np.zeros(len(whole)), np.ones(len(whole)), np.zeros((len(whole), 2))), counts)
 
 
+def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float) -> Panels:
+    """Panels that are steps; parts of them where a step is longer than a panel of `uniform_panels`.
+
+    A step is as long as its states allow, which may be turns where a table gives the speed and nothing else moves.
+
+    Parameters
+    ----------
+    ends : of the steps, increasing, shape (steps,) [s]
+    kinks : whether outputs have a kink there, shape (steps,)
+    turn : time of a turn, infinite where nothing turns [s]
+    """
+    panels, lengths = panels_between(edges, ends, kinks), np.diff(edges.times)
+    longest = min(turn, float(np.sum(lengths[edges.first :]))) / FEWEST
+    spans = np.diff(panels.at(np.array([0.0, 1.0]))[0])[:, 0] * lengths[panels.segment]
+    return split(panels, np.maximum(np.ceil(spans / longest * (1.0 - 1e-9)), 1).astype(int))
+
+
 def _spans(segment: NDArray[np.int_], low: Array, high: Array, kinked: Array) -> Panels:
     """Panels that are whole spans; those at a kink in two."""
     zeros, sides = np.zeros(len(segment)), kinked.astype(bool)
