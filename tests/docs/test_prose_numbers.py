@@ -78,7 +78,7 @@ NAMED: dict[str, dict[str, str]] = {
         "passes −1, a": "a definition",
         "passes −1: above it": "a definition",
         'over `--over "bearing.clearance=10 um:20.2 um"`': "test_steady.py",
-        "follow each other from 20.15 µm on": "test_steady.py",
+        "follow each other from 20.13 µm on": "20.12879 of test_steady.py",
         "at 20.2 µm is": "test_steady.py",
         "with a cage ratio of 3/8": "31.75 mm; test_steady.py",
         "10 to 25 µm it has used up its 400 points at 20.3 µm": "40 s of processor time, which no test repeats",

@@ -180,11 +180,15 @@ def openings_and_closings(
 def test_the_branch_of_the_press_goes_into_its_chaotic_region(make_model: Callable[..., Model]) -> None:
     press = make_model("punching_press_tangent")
     branch = press.steady(over="bearing.clearance=10 um:20.2 um", parameters=THREE_EIGHTHS).branches[0]
-    last = branch.points[-1]
     assert branch.ended == "at the end of the range"
-    assert abs(last.multipliers[0]) > 10.0  # a state that repels
-    places = [round(point.value * 1e6, 2) for point in branch.special if point.value > 20.1e-6]
-    assert places[-7:] == [20.15, 20.15, 20.17, 20.18, 20.17, 20.17, 20.19]  # folds are passed, not jumped over
+    assert abs(branch.points[-1].multipliers[0]) > 10.0  # a state that repels
+    # folds and doublings of branches over other ranges: which neighbours are passed within one step depends on the last
+    # digits, but none lies elsewhere
+    known = [20.12879, 20.12928, 20.15138, 20.15265, 20.15360, 20.16724, 20.17368, 20.17486, 20.17614, 20.18525]
+    known += [20.18541, 20.18663, 20.18874]
+    seen = [point for point in branch.special if point.value > 20.1e-6]
+    assert len(seen) > 1
+    assert all(min(abs(point.value * 1e6 - place) for place in known) < 2e-5 for point in seen)
     readings = press.bifurcation("bearing.clearance=20.19 um:20.2 um:2", parameters=THREE_EIGHTHS, readings=60).up[-1]
     assert readings.exponent is not None
     assert readings.exponent.low > 0.0  # beside it motion is chaotic

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from ballpass.runtime.ask.shooting import Shooting
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
+from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import DEFLECTION
@@ -160,7 +160,7 @@ def _deflections(
     request = Request(
         duration=length / part[1],
         initial=begin,
-        rtol=DERIVATIVE_RTOL if shooting.rtol is None else shooting.rtol,
+        rtol=BRANCH_RTOL if shooting.rtol is None else shooting.rtol,
         transient_cycles=0.0,
         kinks=kinks,
     )

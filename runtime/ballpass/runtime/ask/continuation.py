@@ -148,6 +148,7 @@ def follow(
             along = (then.y - now.y) / np.linalg.norm(then.y - now.y)
             if min(along @ now.tangent, along @ then.tangent, now.tangent @ then.tangent) < BEND:
                 raise SimulationError("steady: the branch bends too much within a step.")
+            end = None if 0.0 <= then.y[-1] <= 1.0 else path.at_end(now, then)
         except SimulationError:
             step /= 2.0
             if step < LEAST_STEP:
@@ -163,12 +164,9 @@ def follow(
         found += [point for point in _changes(path, now, then, step) if path.holds(point.value)]
         if progress is not None:
             progress(min(max(float(then.y[-1]), 0.0), 1.0))
-        if not 0.0 <= then.y[-1] <= 1.0:
-            try:
-                found.append(path.point(path.at_end(now, then), ""))
-                ended = "at the end of the range"
-            except SimulationError:
-                ended = "a step before the end of the range, at which no state was found"
+        if end is not None:
+            found.append(path.point(end, ""))
+            ended = "at the end of the range"
             break
         found.append(path.point(then, ""))
         step = min(step * (1.5 if then.iterations <= 3 else 1.0), LARGEST_STEP)

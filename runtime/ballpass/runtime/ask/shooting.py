@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ballpass.runtime.ask.forcing_period import ForcingPeriod
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -23,6 +24,7 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import sensitivities
+from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.start import RunEnd
 
 #: Most iterations, and halvings of a step that does not lessen what is left.
@@ -32,7 +34,11 @@ ITERATIONS, HALVINGS = 20, 5
 CLOSE = 1e-9
 
 #: Tolerance of the iterations until they are this close; the last ones have the tight one.
-ROUGH, NEAR = 1e-8, 1e-4
+ROUGH, NEAR = 1e-8, 0.1
+
+#: Behind a tight step below this the state is there, for what Newton leaves is of the order of its square.
+#: A run without derivatives confirms it [1].
+SURE = 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +73,7 @@ class PeriodicState:
     monodromy : derivative of the state after all periods by that at the start, shape (states, states)
     multipliers : its eigenvalues, largest first
     left : what is left, for each iteration, in shares of the states' magnitudes [1]
-    periods : integrated in all, with tangents
+    periods : integrated in all
     """
 
     nodes: np.ndarray
@@ -127,18 +133,8 @@ class Shooting:
         by_parameter = np.zeros_like(nodes)
         by_states = np.zeros((self.segments, count, self.segments, count))
         monodromy = np.eye(count)
-        states = tuple(info.name for info in model.manifest.states)
         for k in range(self.segments):
-            begin = RunEnd(
-                time=k * length / self.segments, x=nodes[k].copy(), states=states, parameters=numbers.parameters
-            )
-            request = Request(
-                duration=length / self.segments,
-                initial=begin,
-                samples_per_cycle=1,
-                outputs=[],
-                rtol=self.rtol if rtol is None else rtol,
-            )
+            request = self._request(nodes, k, numbers, self.rtol if rtol is None else rtol)
             found = sensitivities(model, numbers, request, names, with_jumps=True)
             end, slopes = found.solution.x[-1], found.x[-1]
             flow, nxt = slopes[:, :count], (k + 1) % self.segments
@@ -163,6 +159,28 @@ class Shooting:
             monodromy=monodromy,
         )
 
+    def change(self, nodes: np.ndarray, value: float | None = None) -> float:
+        """Largest of what a period leaves from these states, by runs without derivatives.
+
+        Raises
+        ------
+        IntegrationError
+            A run failed.
+        """
+        numbers = self.numbers(value)
+        rtol = DERIVATIVE_RTOL if self.rtol is None else self.rtol
+        ends = [
+            simulate(self.model, numbers, self._request(nodes, k, numbers, rtol)).x[-1] for k in range(self.segments)
+        ]
+        return float(np.max(np.abs((np.array(ends) - np.roll(nodes, -1, axis=0)) / self.magnitude)))
+
+    def _request(self, nodes: np.ndarray, k: int, numbers: Numbers, rtol: float | None) -> Request:
+        """A run over a segment."""
+        length = self.repeats * self.period.time(numbers.values) / self.segments
+        states = tuple(info.name for info in self.model.manifest.states)
+        begin = RunEnd(time=k * length, x=nodes[k].copy(), states=states, parameters=numbers.parameters)
+        return Request(duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol)
+
     def solve(self, nodes: np.ndarray, value: float | None = None) -> PeriodicState:
         """Newton's iteration from these states, with shorter steps where a whole one lessens nothing.
 
@@ -185,6 +203,18 @@ class Shooting:
                     "load."
                 ) from None
             share, small = 1.0, float(np.max(np.abs(step / self.magnitude)))
+            if tight and small < SURE:
+                runs += 1
+                after = self.change(nodes + step, value)
+                if after < close or small < close:
+                    multipliers = np.linalg.eigvals(now.monodromy)
+                    return PeriodicState(
+                        nodes=nodes + step,
+                        monodromy=now.monodromy,
+                        multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
+                        left=(*left, after),
+                        periods=runs * self.repeats,
+                    )
             tight = tight or small < NEAR
             for _ in range(HALVINGS):
                 then = self.residual(nodes + share * step, value, None if tight else rough)
@@ -196,15 +226,6 @@ class Shooting:
                 break
             nodes, now = nodes + share * step, then
             left.append(now.size)
-            if tight and (small < close or now.size < close):
-                multipliers = np.linalg.eigvals(now.monodromy)
-                return PeriodicState(
-                    nodes=nodes,
-                    monodromy=now.monodromy,
-                    multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
-                    left=tuple(left),
-                    periods=runs * self.repeats,
-                )
         raise SimulationError(
             f"steady: Newton's iteration ended at a change of {left[-1]:.2g} of the states' magnitudes in a period "
             f"(begun at {left[0]:.2g}). Take a longer transient, more segments, or another start; chaotic motion has "

@@ -92,7 +92,7 @@ class SteadyState(ShortRepr, Reported):
     contacts : which elements touch, in which order, within a period
     left : what a period changed before each iteration and after the last one, in shares of the states' magnitudes [1]
     segments : of multiple shooting
-    integrated : periods that the iterations integrated, with tangents
+    integrated : periods that the iterations integrated, the last of them without tangents
     difference : of the accelerations a period apart, at one state, relative to them [1]
     over : the range of the branches' parameter, None for none
     branches : of states over that parameter; that of `start` first, then those of twice the period
@@ -156,6 +156,12 @@ class SteadyState(ShortRepr, Reported):
             return f"dies out: less than {self.resolution:.0e} of it is left"
         return f"becomes {largest:.4g} times as large"
 
+    def _without_newton(self) -> str:
+        """Periods that a transient takes to come as near, by the largest multiplier."""
+        size, lessened = abs(self.multipliers[0]), self.left[-1] / self.left[0]
+        periods = math.log(lessened) / math.log(size) if 0.0 < size < 1.0 and 0.0 < lessened < 1.0 else 0.0
+        return f"; a transient takes {periods:.0f} periods to come as near" if periods > self.integrated else ""
+
     def _report(self) -> Report:
         from ballpass.runtime.ask.steady_report import (
             branch_facts,
@@ -201,7 +207,7 @@ class SteadyState(ShortRepr, Reported):
             contact_words(self.contacts),
             f"After each of Newton's iterations a period changed the state by "
             f"{', '.join(f'{left:.1e}' for left in self.left)} of its magnitude; {self.integrated} periods integrated, "
-            f"in {self.segments} segment{'s' if self.segments > 1 else ''}",
+            f"in {self.segments} segment{'s' if self.segments > 1 else ''}{self._without_newton()}",
         ]
         if self.sooner < self.repeats:
             parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")
