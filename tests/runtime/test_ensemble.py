@@ -16,7 +16,7 @@ import pytest
 import xarray
 from press_laws import press
 
-from ballpass.runtime import Model, RequestError, SimulationError
+from ballpass.runtime import Model, QuantityFunction, RequestError, SimulationError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.member_segments import moments, stretches
@@ -561,3 +561,21 @@ def test_values_that_say_another_unit_are_refused(make_model: Callable[..., Mode
     for column in (xarray.DataArray([392.0], attrs={"units": "rpm"}), np.array([392.0]) * unit.rpm):
         with pytest.raises(RequestError, match=r"shaft\.speed: values in rpm were given.*values in rad/s"):
             model.simulate_many({name: column}, "rms:inner.y", cycles=22)
+    speed, other = xarray.DataArray(392.0, attrs={"units": "rpm"}), "bearing.clearance"
+    function = QuantityFunction(model, "rms:inner.y", [name], cycles=22)
+    calls: tuple[Callable[[], object], ...] = (
+        lambda: model.simulate(cycles=1, transient=0, parameters={name: speed}),
+        lambda: model.quantities("rms:inner.y", parameters={name: 392.0 * unit.rpm}),
+        lambda: function(xarray.DataArray([392.0], attrs={"units": "rpm"})),
+        lambda: function.jacobian(np.array([392.0]) * unit.rpm),
+        lambda: function.certify({name: speed}),
+        lambda: model.fit({"time": np.arange(9.0), "inner.y": np.arange(9.0), name: speed}, f"{other}=1 um:2 um"),
+    )
+    for call in calls:
+        with pytest.raises(RequestError, match=r"values in rpm were given.*values in rad/s"):
+            call()
+    mixed = QuantityFunction(model, "rms:inner.y", [name, other], cycles=22)
+    with pytest.raises(RequestError, match="values in rpm were given"):
+        mixed(xarray.DataArray([392.0, 1e-5], attrs={"units": "rpm"}))
+    with pytest.raises(RequestError, match=r"times: values in ms were given.*values in s"):
+        model.simulate(times=xarray.DataArray([1.0, 2.0], attrs={"units": "ms"}))

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from ballpass.runtime import Model, RequestError, SimulationError
 from ballpass.runtime.ask.fit_report import FitAnswer
+from ballpass.runtime.ask.measured import read_trial
 from ballpass.runtime.report.text import to_text
 
 RATIO, CLEARANCE, HOUSING = "bearing.damping.ratio", "bearing.clearance", "bearing.outer_ring.stiffness"
@@ -246,3 +248,21 @@ def test_a_chaotic_motion_is_refused(press: Model) -> None:
 def test_wrong_requests_are_refused(press: Model, data: object, options: dict[str, str], words: str) -> None:
     with pytest.raises(RequestError, match=words):
         press.fit(data, f"{CLEARANCE}=5 um:30 um", **options)
+
+
+def test_arrays_that_say_their_unit_are_taken_in_it(make_virtual: Callable[..., Model]) -> None:
+    """As columns of files are."""
+    manifest = make_virtual("varying_compliance").manifest
+    times, places = np.arange(1.0, 10.0), np.sin(np.arange(9.0))
+    plain = read_trial(manifest, {"time": 1e-3 * times, "inner.y": 1e-6 * places}, {}, 1)
+    units = {"time": "ms", "inner.y": "um"}
+    named = {
+        name: xarray.DataArray(column, attrs={"units": units[name]})
+        for name, column in (("time", times), ("inner.y", places))
+    }
+    found = read_trial(manifest, named, {}, 1)
+    assert found.t == pytest.approx(plain.t, rel=1e-15)
+    assert found.signals["inner.y"] == pytest.approx(plain.signals["inner.y"], rel=1e-14, abs=1e-20)
+    pairs = {"rms:inner.y": xarray.DataArray([5.0, 0.1], attrs={"units": "um"})}
+    (quantities,) = read_trial(manifest, pairs, {}, 1).quantities
+    assert (quantities.values[0], quantities.sizes[0]) == pytest.approx((5e-6, 1e-7), rel=1e-12)

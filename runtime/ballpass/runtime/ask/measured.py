@@ -22,7 +22,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import said_unit, unknown_name, wrong_unit
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
 
@@ -107,10 +107,16 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
     else:
         name = f"trial {number}"
         numbers = {key: float(_floats(name, key, source[key], ())) for key in source if key in infos}
-        table = {str(key): (source[key], "") for key in source if key not in infos}
+        for key, info in infos.items():
+            if key in source and (wrong := wrong_unit(source[key], info.unit)):
+                raise RequestError(f"{name}, {key}: {wrong}")
+        table = {str(key): (source[key], said_unit(source[key])) for key in source if key not in infos}
         if "time" not in table and table and all(np.size(value) <= 2 for value, _ in table.values()):
             pairs = {key: np.atleast_1d(_floats(name, key, value)) for key, (value, _) in table.items()}
-            rows = [(key, *(f"{number!r}" for number in pair.tolist())) for key, pair in pairs.items()]
+            units = {key: unit.removeprefix("1") for key, (_, unit) in table.items()}
+            rows = [
+                (key, *(f"{number!r} {units[key]}".rstrip() for number in pair.tolist())) for key, pair in pairs.items()
+            ]
             table = {"quantity": (rows, "")}
     if "quantity" in table:
         given = (_quantities(manifest, name, table["quantity"][0]),)

@@ -26,7 +26,7 @@ from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 from ballpass.runtime.contract.arguments import typed_methods
 from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, unknown_name, wrong_unit
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
@@ -234,7 +234,7 @@ class QuantityFunction:
         [('bearing.clearance', 'verified')]
         """
         values = self.start if x is None else self.arguments(x) if isinstance(x, Mapping) else x
-        given = _array(values)
+        given = self._array(values)
         self.check_shape(given.shape)
         if given.ndim > 1:
             raise RequestError(f"certify: one point is expected, of shape ({len(self.wrt)},), not {given.shape}.")
@@ -268,11 +268,14 @@ class QuantityFunction:
         Raises
         ------
         RequestError
-            A name that is none of `wrt`.
+            A name that is none of `wrt`, or values that say another unit.
         """
-        for name in parameters:
+        infos = {info.name: info.unit for info in self._model.manifest.parameters}
+        for name, value in parameters.items():
             if name not in self.wrt:
                 raise RequestError(unknown_name("parameter of this function", name, self.wrt))
+            if wrong := wrong_unit(value, infos[name]):
+                raise RequestError(f"{name}: {wrong}")
         return [parameters.get(name, value) for name, value in zip(self.wrt, self.start.tolist(), strict=True)]
 
     def refuse_second(self) -> NoReturn:
@@ -293,9 +296,22 @@ class QuantityFunction:
         """
         refuse_jumps(self._model.manifest, "derivatives")
 
+    def _array(self, x: ArrayLike) -> Array:
+        """The parameters as they are; refuses what is no numbers, or says another unit."""
+        infos = {info.name: info.unit for info in self._model.manifest.parameters}
+        if wrong := wrong_unit(x, *(infos[name] for name in self.wrt)):
+            raise RequestError(f"parameters: {wrong}")
+        try:
+            return np.asarray(x, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            raise RequestError(
+                f"parameters: an array of numbers, SI, is expected, not {x!r:.60} ({type(x).__name__}). A mapping from "
+                "names goes through `arguments`."
+            ) from None
+
     def _rows(self, x: ArrayLike) -> tuple[Array, NDArray[np.int_], tuple[int, ...]]:
         """The parameters as a table, the rows to run, and the shape in front."""
-        given = _array(x)
+        given = self._array(x)
         self.check_shape(given.shape)
         rows = given.reshape(-1, len(self.wrt))
         finite = np.isfinite(rows).all(axis=1)
@@ -399,16 +415,6 @@ class QuantityFunction:
 
     def _told(self, row: Array) -> str:
         return _some([f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True)])
-
-
-def _array(x: ArrayLike) -> Array:
-    try:
-        return np.asarray(x, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise RequestError(
-            f"parameters: an array of numbers, SI, is expected, not {x!r:.60} ({type(x).__name__}). A mapping from "
-            "names goes through `arguments`."
-        ) from None
 
 
 def _check_word(what: str, given: str, allowed: tuple[str, ...]) -> None:

@@ -117,7 +117,9 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
             faults.append(unknown_name("parameter", name, values))
             continue
         number = scalar(value)
-        if number is None:
+        if wrong := wrong_unit(value, units[name]):
+            faults.append(f"{name}: {wrong}")
+        elif number is None:
             what = f"{value!r:.200} ({type(value).__name__})"
             faults.append(f"{name}: one number in {units[name]} is expected, not {what}")
         elif not math.isfinite(number):
@@ -190,6 +192,26 @@ def scalar(value: object) -> float | None:
         except OverflowError:  # an integer of more than 308 digits
             return math.inf if abs(value) == value else -math.inf
     return None
+
+
+def said_unit(given: object) -> str:
+    """Unit that numbers of xarray or pint say of themselves, as a scene would have it; empty for plain numbers."""
+    said = getattr(given, "units", None)  # of pint
+    if said is None:
+        said = getattr(given, "attrs", {}).get("units")  # of xarray
+    if said is None:
+        return ""
+    text = f"{said:~}" if hasattr(said, "dimensionality") else str(said)  # pint's symbols
+    return text.replace(" ", "") or "1"
+
+
+def wrong_unit(given: object, *units: str) -> str:
+    """What is wrong with numbers that say another unit than these, which should be one; empty where nothing is."""
+    said = said_unit(given)
+    if not said or {said} == set(units):
+        return ""
+    allowed = f", or values in {units[0]}" if len(set(units)) == 1 else ""
+    return f"values in {said} were given. Allowed: plain numbers in SI{allowed}. Convert them."
 
 
 def real(value: object) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name, wrong_unit
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
@@ -97,12 +97,8 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
         if name not in defaults:
             faults.append(unknown_name("parameter", name, defaults))
             continue
-        unit = _unit(given)
-        if unit not in ("", units[name]):
-            faults.append(
-                f"{name}: values in {unit} were given. Allowed: plain numbers, or values in {units[name]}. Convert "
-                "them."
-            )
+        if wrong := wrong_unit(given, units[name]):
+            faults.append(f"{name}: {wrong}")
             continue
         try:
             column = np.array(getattr(given, "magnitude", given), dtype=float)
@@ -130,17 +126,6 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     if faults:
         raise RequestError("\n".join(faults))
     return columns
-
-
-def _unit(given: object) -> str:
-    """Unit that an array of xarray or pint says of itself, as a scene would have it; empty for plain numbers."""
-    said = getattr(given, "units", None)  # of pint
-    if said is None:
-        said = getattr(given, "attrs", {}).get("units")  # of xarray
-    if said is None:
-        return ""
-    text = f"{said:~}" if hasattr(said, "dimensionality") else str(said)  # pint's symbols
-    return text.replace(" ", "") or "1"
 
 
 def _plain(given: object) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import real, vector
+from ballpass.runtime.contract.parameters import real, vector, wrong_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import (
@@ -91,6 +91,8 @@ def _sample_times(
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
         return duration, begin + duration * (np.arange(count + 1) / count)
+    if wrong := wrong_unit(request.times, "s"):
+        raise RequestError(f"times: {wrong}")
     times = vector(request.times)
     if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)):
         raise RequestError(
