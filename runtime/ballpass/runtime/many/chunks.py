@@ -150,7 +150,8 @@ def run_chunks(
             work.stop.value = 1
             for future, chunk in pending.items():
                 if future.cancel():
-                    _note(work, chunk.members, "INTERRUPTED", "Interrupted before it began.")
+                    for member in chunk.members.tolist():
+                        note_failure(work, member, "INTERRUPTED", "Interrupted before it began.")
             if not isinstance(fault, KeyboardInterrupt):
                 raise
             interrupted = True
@@ -165,9 +166,9 @@ def _add(counts: dict[str, int], more: Mapping[str, int]) -> None:
         counts[name] += count
 
 
-def _note(work: Work, members: np.ndarray, status: str, message: str) -> None:
-    for member in members.tolist():
-        work.results[member] = MemberFailure(member=member, status=status, time=0.0, message=message)
+def note_failure(work: Work, member: int, status: str, message: str, time: float = 0.0) -> None:
+    """Note that a member has no results, and the time that it reached [s]."""
+    work.results[member] = MemberFailure(member=member, status=status, time=time, message=message)
 
 
 def _magnitudes(work: Work, which: np.ndarray) -> np.ndarray:
@@ -248,14 +249,14 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
             ending = STATUS_OF_END[End(int(result["status"]))]
             state = f", worst state {work.model.states[result['state']]}" if result["state"] >= 0 else ""
             status, message = ending.name, f"{ending.value} Step size {result['step']:.3g} s{state}."
-        work.results[member] = MemberFailure(member=member, status=status, time=float(result["time"]), message=message)
+        note_failure(work, member, status, message, float(result["time"]))
     if rows is not None:
         void = is_void(work.model.manifest, {name: all_[which] for name, all_ in work.members.columns.items()}, rows)
         for place in np.flatnonzero(void & (results["status"] == End.DONE)).tolist():
             member, time = int(which[place]), float(results[place]["time"])
             values = {name: float(all_[member]) for name, all_ in work.members.columns.items()}
             why = void_words(work.model.manifest, values, rows[place])
-            work.results[member] = MemberFailure(member=member, status=Status.VOID.name, time=time, message=why)
+            note_failure(work, member, Status.VOID.name, why, time)
     return counts
 
 
@@ -265,9 +266,9 @@ def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
     counts = dict.fromkeys(COUNTS, 0)
     for place in range(len(chunk.members)):
         if work.stop.value:
-            _note(work, chunk.members[place:], "INTERRUPTED", "Interrupted before it began.")
-            break
-        _alone(work, chunk, place, magnitude[place], counts)
+            note_failure(work, int(chunk.members[place]), "INTERRUPTED", "Interrupted before it began.")
+        else:
+            _alone(work, chunk, place, magnitude[place], counts)
     return counts
 
 
@@ -301,13 +302,9 @@ def _alone(
     try:
         going.go_on()
     except RunFailed as fault:
-        work.results[member] = MemberFailure(
-            member=member, status=fault.status.name, time=fault.time, message=str(fault)
-        )
+        note_failure(work, member, fault.status.name, str(fault), fault.time)
         return
     counts["steps"] += going.steps - before[0]
     counts["rejected"] += going.rejected - before[1]
     if going.time < duration:
-        work.results[member] = MemberFailure(
-            member=member, status="INTERRUPTED", time=going.time, message="Interrupted on its way."
-        )
+        note_failure(work, member, "INTERRUPTED", "Interrupted on its way.", going.time)

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.many.chunks import MemberFailure, Work, member_run
+from ballpass.runtime.many.chunks import Work, member_run, note_failure
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.loop import RunFailed
@@ -59,19 +59,13 @@ def measure_members(
                 done += 1
                 found[member, list(values)] = list(values.values())
                 if fault is not None and member not in work.results:
-                    work.results[member] = MemberFailure(
-                        member=member,
-                        status=fault.status.name if isinstance(fault, RunFailed) else "REFUSED",
-                        time=fault.time if isinstance(fault, RunFailed) else 0.0,
-                        message=str(fault),
-                    )
+                    ended = (fault.status.name, fault.time) if isinstance(fault, RunFailed) else ("REFUSED", 0.0)
+                    note_failure(work, member, ended[0], str(fault), ended[1])
                 progress(done / len(pending))
         except KeyboardInterrupt:
             for future in pending:
                 future.cancel()
             for member in able[done:].tolist():
-                work.results[member] = MemberFailure(
-                    member=member, status="INTERRUPTED", time=0.0, message="Interrupted before it was done."
-                )
+                note_failure(work, member, "INTERRUPTED", "Interrupted before it was done.")
             return True
     return False
