@@ -181,11 +181,7 @@ class SolutionPlot:
             raise RequestError(_lacks("ball.force or ball.elastic_force"))
         window = record.last_turns(turns)
         force = record.ball_force()[1][window]
-        along, label = record.t[window] * 1e3, "time [ms]"
-        if record.turns:
-            along = np.degrees(record.crank_angle()[window])
-            along = along - 360.0 * np.floor(min(along[0], along[-1]) / 360.0 + 1e-9)
-            label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
+        along, label = record.along(window)
         top = max(float(np.max(force)), 1e-12)
         balls = force.shape[1]
         with _axes(ax) as axes:

@@ -129,12 +129,7 @@ def ball_loads(record: Record) -> Figure:
     window = record.last_turns(2)
     force = force[window]
     balls = force.shape[1]
-    if record.turns:
-        angle = np.degrees(record.crank_angle()[window])
-        along = angle - 360.0 * np.floor(min(angle[0], angle[-1]) / 360.0 + 1e-9)
-        label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
-    else:
-        along, label = record.t[window] * 1e3, "time [ms]"
+    along, label = record.along(window)
     windows = record.load_windows() if record.turns else ()
     top = max(float(np.max(force)), 1e-12)
     bottom = min(float(np.min(force)), 0.0)

@@ -123,6 +123,14 @@ class Record:
         start = 0.0 if mechanism is None else self.parameter(mechanism.start_angle)
         return start + driver_angle.shaft_speed(self.manifest, self._values) * time
 
+    def along(self, window: slice) -> tuple[Array, str]:
+        """Axis of some samples and its label: the angle from its first turn on [deg]; the time without turns [ms]."""
+        if not self.turns:
+            return 1e3 * self.t[window], "time [ms]"
+        angle = np.degrees(self.crank_angle()[window])
+        label = "crank angle [°]" if self.manifest.mechanism is not None else "angle of the shaft [°]"
+        return angle - 360.0 * np.floor(min(angle[0], angle[-1]) / 360.0 + 1e-9), label
+
     def load_windows(self) -> tuple[tuple[float, float], ...]:
         """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].
 
@@ -149,8 +157,7 @@ class Record:
         bearing, mechanism = self.bearing, self.manifest.mechanism
         if bearing is None or (mechanism is not None and mechanism.angle):
             return None
-        values = {**self.solution.parameters, **self.solution.constants}
-        return frequencies_of(bearing, mean_speeds(self.manifest, values, self.t))
+        return frequencies_of(bearing, mean_speeds(self.manifest, self._values, self.t))
 
     def ball_angles(self, sample: int) -> Array:
         """Angles of the balls at a sample, (balls,) [rad]."""
