@@ -44,7 +44,6 @@ class Query:
 
     parameters: Mapping[str, float]
     cycles: float
-    samples: int
     of: tuple[str, ...]
     wrt: tuple[str, ...]
 
@@ -118,10 +117,10 @@ def draw(model: Model, generator: np.random.Generator) -> Query:
         wanted.append("mechanism.driver.start_angle")
     others = [info.name for info in manifest.parameters if info.name not in wanted]
     pool = OF + (OF_MECHANISM if mechanism is not None else ())
+    generator.uniform()  # of an option that is gone: each seed keeps its query
     return Query(
         parameters=parameters,
         cycles=cycles,
-        samples=int(10.0 ** generator.uniform(math.log10(16.0), math.log10(2000.0))),
         of=tuple(map(str, generator.choice(pool, QUANTITIES, replace=False))),
         wrt=(str(generator.choice(wanted)), str(generator.choice(others))),
     )
@@ -136,7 +135,6 @@ def examine(model: Model, query: Query) -> list[Row]:
         query.cycles,
         transient=transient,
         parameters=query.parameters,
-        samples_per_cycle=query.samples,
     )
     scales = {name: report[query.of[0], name].scale for name in query.wrt}
     values, found = differentiate(model, query.parameters, query.of, scales, query.cycles, transient)
