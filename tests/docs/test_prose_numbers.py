@@ -307,7 +307,7 @@ NAMED: dict[str, dict[str, str]] = {
         "to within 1e-5": "certificate.py",
         "called ~0": "a definition",
         "300 pairs on five scenes": "certificates.py",
-        "5 to 3000 rpm and 16 to 2000 samples a turn": "certificates.py",
+        "5 to 3000 rpm": "certificates.py",
         "1e-4 of the largest deflection": "grazing.py",
         "below about 1e-9": "an observation, which a status of the run repeats",
     },
