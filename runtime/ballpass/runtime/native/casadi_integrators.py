@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from types import FrameType
 from typing import Any
 
@@ -20,59 +19,34 @@ import numpy as np
 
 from ballpass.runtime.native.kernel import EvaluationError
 
-#: Gives the integrator over so many output intervals.
-Maker = Callable[[int], casadi.Function]
+#: Names of the methods.
+METHODS = ("cvodes",)
 
 #: CasADi's integrators end the process where two threads are in one of them, and count steps in one place for all.
 _ONE_AT_A_TIME = threading.Lock()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Frozen:
-    """What stays constant during a piece: scale of the states, inputs, parameters, constants."""
-
-    scale: np.ndarray
-    u: np.ndarray
-    p: np.ndarray
-    c: np.ndarray
-
-    def pack(self, start: float, step: float) -> np.ndarray:
-        """The integrators' parameter vector: start, step, scale, u, p, c one behind the other, shape (n,)."""
-        return np.concatenate([(start, step), self.scale, self.u, self.p, self.c])
-
-
-class VirtualIntegrator:
-    """The integrator at work on one model.
+def advance(
+    function: casadi.Function, state: np.ndarray, piece: tuple[float, float], scale: np.ndarray, given: np.ndarray
+) -> tuple[np.ndarray, int, int]:
+    """States at the ends of an integrator's output intervals, shape (intervals, states); steps accepted and rejected.
 
     Parameters
     ----------
-    make : gives it over so many output intervals, as `Model.virtual_integrator` does
+    function : from `make_integrator`
+    piece : start, and length of all intervals together [s]
+    scale : error allowed in a step, shape (states,)
+    given : inputs, parameters and constants, one behind the other
 
-    Attributes
-    ----------
-    steps, rejected : accepted and rejected steps so far
+    Raises
+    ------
+    EvaluationError
+        The method could not go on.
     """
-
-    def __init__(self, make: Maker) -> None:
-        self._make = make
-        self.steps = 0
-        self.rejected = 0
-
-    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
-        """States at ``start + step * k / intervals``, k = 1 ... intervals; shape (intervals, states).
-
-        Raises
-        ------
-        EvaluationError
-            The method could not go on.
-        """
-        function = self._make(intervals)
-        with _ONE_AT_A_TIME:
-            samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
-            statistics = function.stats()
-        self.steps += int(statistics["nsteps"])
-        self.rejected += int(statistics["netfails"])
-        return np.asarray(samples.reshape(len(state), intervals).T * frozen.scale)
+    with _ONE_AT_A_TIME:
+        samples = _call(function, {"x0": state / scale, "p": np.concatenate([piece, scale, given])})
+        statistics = function.stats()
+    return samples.reshape(len(state), -1).T * scale, int(statistics["nsteps"]), int(statistics["netfails"])
 
 
 def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], intervals: int) -> casadi.Function:
@@ -101,10 +75,6 @@ def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], intervals: i
     options: dict[str, Any] = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 100_000, "show_eval_warnings": False}
     grid = [k / intervals for k in range(1, intervals + 1)]
     return casadi.integrator(f"cvodes_{intervals}", "cvodes", equations, 0.0, grid, options)
-
-
-#: Name of the method to how it is made.
-METHODS: Mapping[str, Callable[[Maker], VirtualIntegrator]] = {"cvodes": VirtualIntegrator}
 
 
 def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:

@@ -1,67 +1,58 @@
 """A run by CasADi's integrator: segment after segment, in pieces that end at samples.
 
-In: a `Trajectory` and an integrator.  Out: the same, filled.
+In: a run and its `Trajectory`.  Out: the same, filled.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 
 import numpy as np
 
-from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.native.casadi_integrators import Frozen, VirtualIntegrator
+from ballpass.runtime.native import casadi_integrators
 from ballpass.runtime.native.kernel import EvaluationError
+from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 
-def integrate(
-    numbers: Numbers,
-    integrator: VirtualIntegrator | None,
-    scale: np.ndarray,
-    trajectory: Trajectory,
-    progress: Callable[[float], None] | None = None,
-) -> None:
-    """Fill the samples of `trajectory`, and count steps; without integrator there are no states to fill.
-
-    Parameters
-    ----------
-    scale : error allowed in a step, shape (states,)
+def integrate(run: Run, trajectory: Trajectory) -> None:
+    """Fill the samples of `trajectory`, and count steps; without a method there are no states to fill.
 
     Raises
     ------
     Interrupted
         The integrator could not reach the end.
     """
-    if integrator is None:
+    if run.method == "none":
         trajectory.finished = len(trajectory.t)
         trajectory.passed = len(trajectory.segments.inputs)
         return
     segments, stops = trajectory.segments, trajectory.stops
     state = trajectory.initial.copy()
     for k, u in enumerate(segments.inputs):
-        frozen = Frozen(scale=scale, u=u, p=numbers.p, c=numbers.c)
+        given = np.concatenate([u, run.numbers.p, run.numbers.c])
         interval = (float(segments.times[k]), float(segments.times[k + 1]))
         trajectory.passed = k + 1
-        try:
-            state = _segment(integrator, frozen, trajectory, state, interval, (int(stops[k]), int(stops[k + 1])))
-        finally:
-            trajectory.steps, trajectory.rejected = integrator.steps, integrator.rejected
-        if progress is not None:
-            progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
+        state = _segment(run, trajectory, given, state, interval, (int(stops[k]), int(stops[k + 1])))
+        if run.progress is not None:
+            run.progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
 
 
 def _segment(
-    integrator: VirtualIntegrator,
-    frozen: Frozen,
+    run: Run,
     trajectory: Trajectory,
+    given: np.ndarray,
     state: np.ndarray,
     interval: tuple[float, float],
     samples: tuple[int, int],
 ) -> np.ndarray:
-    """Integrate over one segment; the state at its end."""
+    """Integrate over one segment; the state at its end.
+
+    Parameters
+    ----------
+    given : inputs, parameters and constants, one behind the other
+    """
     left, right = interval
     k, stop = samples
     times, near = trajectory.t, trajectory.near
@@ -70,10 +61,12 @@ def _segment(
     def go(until: float, intervals: int) -> np.ndarray:
         nonlocal now, state
         trajectory.calls += 1
+        function, piece = run.model.virtual_integrator(intervals), (now - left, until - now)
         try:
-            block = integrator.advance(state, now - left, until - now, intervals, frozen)
+            block, steps, rejected = casadi_integrators.advance(function, state, piece, run.tolerance, given)
         except EvaluationError as fault:
             raise Interrupted(Status.INTEGRATOR_FAILED, now, str(fault)) from fault
+        trajectory.steps, trajectory.rejected = trajectory.steps + steps, trajectory.rejected + rejected
         if not np.isfinite(block).all():
             raise Interrupted(Status.NOT_FINITE, now, "")
         now, state = until, block[-1]

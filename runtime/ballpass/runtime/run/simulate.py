@@ -80,8 +80,7 @@ def simulate(
             finally:
                 _note(trajectory, samples, going)
         else:
-            integrator = METHODS[run.method](model.virtual_integrator) if run.method != "none" else None
-            integrate(numbers, integrator, run.tolerance, trajectory, run.progress)
+            integrate(run, trajectory)
     except (RunFailed, Interrupted) as end:
         failure = end
     last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial
