@@ -159,7 +159,7 @@ def test_keys_clicks_and_play_move_the_page(press: tuple[Model, Solution], tmp_p
         setTimeout(() => { press(" "); note("played"); }, 1100);
         setTimeout(() => {
           const chart = document.querySelector(".chart"), box = chart.getBoundingClientRect();
-          chart.dispatchEvent(new PointerEvent("pointerdown", { clientX: box.left + box.width * 231 / 420 }));
+          chart.dispatchEvent(new PointerEvent("pointerdown", { clientX: box.left + box.width * 228 / 420 }));
           note("clicked");
         }, 1200);
     """

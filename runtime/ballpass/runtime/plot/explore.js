@@ -219,7 +219,7 @@ function spectrumOf(run, number) {
 function drawSpectrum(bearing, number) {
   if (!bearing || !current) return null;
   const [now, old] = [current, compared ? scene : null].map((run) => (run ? (run.spectra ??= [])[number] ??= spectrumOf(run, number) : []));
-  const [wide, height, left, right, top, below] = [420, 190, 56, 14, 8, 40], section = element(get("charts"), "section");
+  const [wide, height, left, right, top, below] = [420, 190, 56, 20, 8, 40], section = element(get("charts"), "section");
   element(section, "h2", "Spectrum of the motion between the rings [\u00b5m]");
   const picture = draw(section, "svg", { viewBox: `0 0 ${wide} ${height}`, class: "chart", role: "img", "aria-label": "spectrum" });
   const most = highest([...now, ...old].map((line) => line[1])), high = Math.ceil(Math.log10(most)), low = high - 4, end = highest(now.map((line) => line[0]));

@@ -236,7 +236,7 @@ function ticks(low, high) {
 }
 
 function drawChart(title, unit, curves) {
-  const [width, height, left, right, top, below] = [420, 190, 56, 14, 8, 40], section = element(get("charts"), "section");
+  const [width, height, left, right, top, below] = [420, 190, 56, 20, 8, 40], section = element(get("charts"), "section");
   element(section, "h2", `${title} [${unit}]`);
   const picture = draw(section, "svg", { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": title });
   const values = curves.map((curve) => all(curve.signal)), olds = curves.filter((curve) => curve.before).map((curve) => all(curve.before));
