@@ -73,6 +73,7 @@ def sensitivity(
     check: Check = True,
     rtol: TightRtol = None,
     sensitivity_rtol: SensitivityRtol = None,
+    samples_per_cycle: int | None = None,
     kinks: Literal["stepped-over", "located"] | None = None,
     agreement: float | None = None,
     progress: Callable[[str, float], None] | bool | None = None,
@@ -85,6 +86,7 @@ def sensitivity(
     Parameters
     ----------
     parameters : overrides, SI
+    samples_per_cycle : without effect since quadratures have their nodes in the steps of the run
     kinks : as for `sensitivities`
     agreement : relative disagreement of both routes that is allowed
     progress : called with words and a finished fraction; else as for `simulate`
