@@ -14,7 +14,15 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import Points, coupler_points, exaggeration, guide_direction, links, used_points
+from ballpass.runtime.plot.shapes import (
+    DrawnForce,
+    coupler_points,
+    drawn_forces,
+    exaggeration,
+    guide_direction,
+    links,
+    used_points,
+)
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import MechanismInfo
@@ -193,11 +201,7 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             *({"at": at, "text": ", ".join(words)} for at, words in names.items()),
             *({"at": shown.index(key), "text": key[1]} for key in coupler_points(mechanism)),
         ],
-        "forces": [
-            *_reactions(record, samples, shown),
-            *_applied(record, samples, shown),
-            *_springs(record, samples, shown, paths),
-        ],
+        "forces": [_force(one, shown) for one in drawn_forces(record, samples, paths)],
     }
 
 
@@ -208,72 +212,16 @@ def shown_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
     return [*used, *(key for key in every if key[1] == "center_of_mass" and key not in used)]
 
 
-def _reactions(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) -> list[dict[str, Any]]:
-    """Reactions that are outputs, on the frame where it is one of both bodies, else on the joint's first body."""
-    found = []
-    for name, _, first, _, second, point in record.mechanism.joints:
-        if record.has(f"reaction.{name}.x", f"reaction.{name}.y"):
-            sign = -1.0 if second == FRAME else 1.0
-            on, by = (second, first) if second == FRAME else (first, second)
-            force = np.column_stack([record.values(f"reaction.{name}.{axis}")[samples] for axis in "xy"])
-            x, y = _columns(sign * force)
-            found.append(
-                {
-                    "name": f"reaction.{name}",
-                    "words": f"{name}: {by} on {on}",
-                    "at": shown.index((second, point)),
-                    "pushes": False,
-                    "x": x,
-                    "y": y,
-                }
-            )
-    return found
-
-
-def _applied(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) -> list[dict[str, Any]]:
-    """Applied forces, zero while they do not act."""
-    acting = [record.applied_forces(float(record.t[k])) for k in samples]
-    places = dict.fromkeys((name, place) for now in acting for name, place, _ in now)
-    found = []
-    for name, place in places:
-        force = np.array([next((f for n, _, f in now if n == name), np.zeros(2)) for now in acting])
-        x, y = _columns(force)
-        found.append(
-            {
-                "name": f"force.{name}",
-                "words": f"{name} on {place[0]}",
-                "at": shown.index(place),
-                "pushes": True,
-                "x": x,
-                "y": y,
-            }
-        )
-    return found
-
-
-def _springs(record: Record, samples: np.ndarray, shown: list[tuple[str, str]], paths: Points) -> list[dict[str, Any]]:
-    """Forces of springs and stops on what moves, where their tension is an output."""
-    found = []
-    for label, *ends in record.mechanism.springs:
-        tension = record.spring_tension(label)
-        pairs = [(ends[0], ends[1]), (ends[2], ends[3])]
-        for key, other in (pairs, pairs[::-1]):
-            if tension is None or key[0] == FRAME:
-                continue
-            way = paths[other] - paths[key]
-            pull = tension[samples]
-            x, y = _columns(pull[:, None] * way / np.maximum(np.hypot(*way.T), 1e-12)[:, None])
-            found.append(
-                {
-                    "name": f"{label}.{key[0]}",
-                    "words": f"{label.replace('.', ' ')} on {key[0]}",
-                    "at": shown.index(key),
-                    "pushes": bool(np.mean(pull) < 0.0),
-                    "x": x,
-                    "y": y,
-                }
-            )
-    return found
+def _force(one: DrawnForce, shown: list[tuple[str, str]]) -> dict[str, Any]:
+    x, y = _columns(one.force)
+    return {
+        "name": one.name,
+        "words": one.words,
+        "at": shown.index(one.at),
+        "pushes": one.pushes,
+        "x": x,
+        "y": y,
+    }
 
 
 def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:

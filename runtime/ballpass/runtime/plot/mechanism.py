@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import Points, coupler_points, guide_direction, links, used_points
+from ballpass.runtime.plot.shapes import Points, coupler_points, drawn_forces, guide_direction, links, used_points
 from ballpass.runtime.plot.style import APPLIED, GREY, INK, SIGNAL, TORQUE, arrow, write
 
 #: Positions in which the paths of moving joints are traced.
@@ -305,24 +305,17 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
 
 def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
     """Reactions on the frame, applied forces that act, and those of springs on moving bodies."""
-    found = [
-        _ForceArrow(name="", at=at, force=force, colour=SIGNAL, pushes=False)
-        for at, force in _reactions(record, now, sample)
-    ]
-    for name, key, force in record.applied_forces(float(record.t[sample])):
-        found.append(_ForceArrow(name=name, at=now[key], force=force, colour=APPLIED, pushes=True))
-    for label, *ends in record.mechanism.springs:
-        tension = record.spring_tension(label)
-        pairs = ((ends[0], ends[1]), (ends[2], ends[3]))
-        for key, other in (pairs, pairs[::-1]):
-            way = now[other] - now[key]
-            length = float(np.hypot(*way))
-            if tension is not None and key[0] != FRAME and length > 0.0:
-                pull = float(tension[sample])
-                name = label.partition(".")[2]
-                found.append(
-                    _ForceArrow(name=name, at=now[key], force=pull * way / length, colour=APPLIED, pushes=pull < 0.0)
-                )
+    joints = record.mechanism.joints
+    hinges = {item[0]: item[2:4] for item in joints if item[1] == "revolute" and FRAME in (item[2], item[4])}
+    found = []
+    for one in drawn_forces(record, np.array([sample]), {key: place[None, :] for key, place in now.items()}):
+        kind, name, *_ = one.name.split(".")
+        if kind != "reaction":
+            found.append(_ForceArrow(name=name, at=now[one.at], force=one.force[0], colour=APPLIED, pushes=one.pushes))
+        elif name in hinges:
+            found.append(
+                _ForceArrow(name="", at=now[hinges[name]], force=one.force[0], colour=SIGNAL, pushes=one.pushes)
+            )
     return found
 
 
@@ -345,16 +338,3 @@ def _draw_torque(axes: Axes, at: Array, share: float, size: float) -> Array:
     head = np.array([around(half + 0.15 * np.sign(share)), around(neck, 1.25 * _ARC), around(neck, 0.75 * _ARC)])
     axes.add_patch(Polygon(head, facecolor=TORQUE, edgecolor="none", zorder=6.5))
     return arc
-
-
-def _reactions(record: Record, now: Points, sample: int) -> list[tuple[Array, Array]]:
-    """Places of the frame's revolute joints whose reaction is an output [m], and the forces on the frame there [N]."""
-    mechanism = record.mechanism
-    found: list[tuple[Array, Array]] = []
-    for name, kind, first, point, second, _ in mechanism.joints:
-        outputs = [f"reaction.{name}.{axis}" for axis in "xy"]
-        if kind == "revolute" and FRAME in (first, second) and record.has(*outputs):
-            # the reaction is the force of the second body on the first
-            sign = 1.0 if first == FRAME else -1.0
-            found.append((now[first, point], sign * np.array([record.values(one)[sample] for one in outputs])))
-    return found

@@ -1,12 +1,13 @@
-"""Shapes of links, guides and displaced rings, for pictures and pages alike; needs no matplotlib."""
+"""Shapes of links, guides and displaced rings, and forces, for pictures and pages alike; needs no matplotlib."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.plot.record import FRAME, Array
+from ballpass.runtime.plot.record import FRAME, Array, Record
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import MechanismInfo
@@ -90,3 +91,53 @@ def exaggeration(shown: float, actual: float) -> float:
         return 1.0
     decade = 10.0 ** np.floor(np.log10(shown / actual))
     return float(max(1.0, decade * max(digit for digit in (1.0, 2.0, 5.0) if digit * decade <= shown / actual)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnForce:
+    """A force of a picture over samples.
+
+    Attributes
+    ----------
+    name, words : as ``reaction.A``, ``force.punch`` or ``spring.valve.rod``; by and on which body
+    at : body and point where it acts
+    pushes : whether its arrow ends there; else it begins there
+    force : components, shape (samples, 2) [N]
+    """
+
+    name: str
+    words: str
+    at: tuple[str, str]
+    pushes: bool
+    force: Array
+
+
+def drawn_forces(record: Record, samples: np.ndarray, paths: Points) -> list[DrawnForce]:
+    """Reactions that are outputs, applied forces, and those of springs and stops on moving bodies, at some samples.
+
+    A reaction is drawn on the frame where that is one of both bodies, else on the joint's first body.  Applied forces
+    are zero while they do not act.
+    """
+    found = []
+    for name, _, first, _, second, point in record.mechanism.joints:
+        if record.has(f"reaction.{name}.x", f"reaction.{name}.y"):
+            # the reaction is the force of the second body on the first
+            sign, on, by = (-1.0, second, first) if second == FRAME else (1.0, first, second)
+            force = np.column_stack([record.values(f"reaction.{name}.{axis}")[samples] for axis in "xy"])
+            words, at = f"{name}: {by} on {on}", (second, point)
+            found.append(DrawnForce(name=f"reaction.{name}", words=words, at=at, pushes=False, force=sign * force))
+    acting = [record.applied_forces(float(record.t[k])) for k in samples]
+    for name, at in dict.fromkeys((name, at) for now in acting for name, at, _ in now):
+        force = np.array([next((f for n, _, f in now if n == name), np.zeros(2)) for now in acting])
+        found.append(DrawnForce(name=f"force.{name}", words=f"{name} on {at[0]}", at=at, pushes=True, force=force))
+    for label, *ends in record.mechanism.springs:
+        tension = record.spring_tension(label)
+        pairs = [(ends[0], ends[1]), (ends[2], ends[3])]
+        for at, other in (pairs, pairs[::-1]):
+            if tension is None or at[0] == FRAME:
+                continue
+            way, pull = paths[other] - paths[at], tension[samples]
+            force = pull[:, None] * way / np.maximum(np.hypot(*way.T), 1e-12)[:, None]
+            words, pushes = f"{label.replace('.', ' ')} on {at[0]}", bool(np.mean(pull) < 0.0)
+            found.append(DrawnForce(name=f"{label}.{at[0]}", words=words, at=at, pushes=pushes, force=force))
+    return found
