@@ -470,9 +470,19 @@ def test_a_one_way_bearing_has_no_place_in_a_linkage_with_play(scene_text: Calla
     one_way = text.replace('coupling = "two-way"\ncount = 2 ', "share = 0.5 ", 1)
     with pytest.raises(SceneError, match="one coupling for all bearings"):
         scene_from_text(one_way, "press")
-    twice = text.replace('joint = "B"', 'joint = "C"', 1).replace('body = "crank"', 'body = "rod"')
-    with pytest.raises(SceneError, match="another bearing gives this joint its play"):
-        scene_from_text(twice, "press")
+
+
+def test_inner_rings_of_one_joint_are_on_one_body_and_start_together(scene_text: Callable[..., str]) -> None:
+    text = scene_text("punching_press_hinges")
+    beside = text.replace('joint = "B"', 'joint = "A"', 1)
+    assert [b.beside for b in scene_from_text(beside, "press").bearings] == ["", "main", ""]
+    apart = beside.replace(
+        '[bearings.big_end.inner_ring]\nbody = "crank"', '[bearings.big_end.inner_ring]\nbody = "frame"'
+    )
+    start = beside.replace("[bearings.big_end.contact]", 'initial.inner = ["1 um", "0 um"]\n[bearings.big_end.contact]')
+    for wrong, words in ((apart, "all inner rings of a joint on one body"), (start, "initial state of bearings.main")):
+        with pytest.raises(SceneError, match=words):
+            scene_from_text(wrong, "press")
 
 
 DUTY = '\n[duty.work]\nshare = 0.7\n[duty.idle]\nshare = 0.3\nset.mechanism.driver.speed = "300 rpm"\n'

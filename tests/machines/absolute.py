@@ -65,7 +65,8 @@ class Absolute:
         self.bodies = [b.name for b in self.mechanism.bodies]
         self.elastic = [b.name for b in self.bearings if b.outer is not None]
         self.size = 3 * len(self.bodies) + 2 * len(self.elastic)
-        self.in_play = {b.joint: b for b in self.bearings}
+        self.in_play = {b.joint: [other for other in self.bearings if other.joint == b.joint] for b in self.bearings}
+        self.first = [several[0] for several in self.in_play.values()]  # the others' inner rings move alike
         self.speed = self.values[self.mechanism.driver.speed.path]
         self.start = self.values[self.mechanism.driver.start_angle.path]
         joint = self.mechanism.joint(self.mechanism.driver.joint)
@@ -204,7 +205,7 @@ class Absolute:
         for _ in range(40):
             residual, rows, *_ = self.constraints(q, still, angle, 0.0)
             parts, slopes = [residual], [rows]
-            for bearing in self.bearings:
+            for bearing in self.first:
                 inner, housing, _ = self.play(bearing, q, still)
                 parts.append(inner.position - housing.position - displaced.get(bearing.name, np.zeros(2)))
                 slopes.append((inner - housing).jacobian)
@@ -256,8 +257,9 @@ class Absolute:
         speeds: dict[str, Array] = {}
         rings, ring_rates, k = [], [], 0
         for bearing in self.bearings:
-            shifts[bearing.name], speeds[bearing.name] = x[k : k + 2], x[half + k : half + k + 2]
-            k += 2
+            if bearing in self.first:
+                shifts[bearing.name], speeds[bearing.name] = x[k : k + 2], x[half + k : half + k + 2]
+                k += 2
             if bearing.outer is not None:
                 rings.append(x[k : k + 2])
                 ring_rates.append(x[half + k : half + k + 2])
@@ -265,7 +267,7 @@ class Absolute:
         q = self._closed(angle, self.ideal(angle), shifts, rings)
         _, rows, wanted, *_ = self.constraints(q, np.zeros(self.size), angle, rate)
         slopes, ends = [rows], [wanted]
-        for bearing in self.bearings:
+        for bearing in self.first:
             inner, housing, _ = self.play(bearing, q, np.zeros(self.size))
             slopes.append((inner - housing).jacobian)
             ends.append(speeds[bearing.name])

@@ -52,12 +52,13 @@ def largest_imbalance(derived: Derived, machine: Multibody, t: float, x: np.ndar
     (balance,) = derived.at(t, x, gates)[4]
     assert balance == pytest.approx(outputs["drive_torque"], rel=1e-9, abs=1e-12 * largest)
     worst = 0.0
-    for one in machine.bearings:
-        joint = machine.mechanism.joint(one.joint or "")
-        sign = 1.0 if one.inner_body == joint.bodies[0] else -1.0
-        on_inner = -machine.count(one) * np.array([outputs[f"{one.prefix}ring_force.{axis}"] for axis in "xy"])
-        if one.outer is not None:
-            on_inner, _ = machine.housing_force(one, q, v)
+    for name, several in machine.in_play.items():
+        joint = machine.mechanism.joint(name or "")
+        sign = 1.0 if several[0].inner_body == joint.bodies[0] else -1.0
+        on_inner = np.zeros(2)
+        for one in several:
+            push = -machine.count(one) * np.array([outputs[f"{one.prefix}ring_force.{axis}"] for axis in "xy"])
+            on_inner += push if one.outer is None else machine.housing_force(one, q, v)[0]
         reaction = np.array([outputs[f"reaction.{joint.name}.{axis}"] for axis in "xy"])
         worst = max(worst, float(np.max(np.abs(reaction - sign * on_inner))) / largest)
     return worst

@@ -68,9 +68,13 @@ def bearing(
     stiffness: float | None = 8.6e9,
     effects: str = "",
     angle: str = "",
+    beside: str = "",
 ) -> str:
-    """Tables of a bearing coupled two-way at a joint; `inner` carries the inner ring; no stiffness: from geometry."""
-    name = f"bearings.at_{joint}"
+    """Tables of a bearing coupled two-way at a joint; `inner` carries the inner ring; no stiffness: from geometry.
+
+    One of several at the joint has a name that `beside` makes different.
+    """
+    name = f"bearings.{beside}at_{joint}"
     support = 'support = "fixed"'
     if elastic:
         support = f'support = "elastic"\nmass = "0.5 kg"\nstiffness = "5e7 N/m"\ndamping = "{housing_damping}"'

@@ -318,10 +318,11 @@ class Multibody(Absolute):
         outputs = {"drive_torque": float(multipliers[where["driver"]][0]) if held else self.torque(rate)}
         for joint in self.mechanism.joints:
             if joint.name in self.in_play:
-                bearing = self.in_play[joint.name]
-                on_inner = -self.count(bearing) * self.ring_force(bearing, q, v)
-                if bearing.outer is not None:
-                    on_inner = self.housing_force(bearing, q, v)[0]
+                on_inner = np.zeros(2)
+                for bearing in self.in_play[joint.name]:
+                    held = bearing.outer is not None
+                    ring_force = -self.count(bearing) * self.ring_force(bearing, q, v)
+                    on_inner += self.housing_force(bearing, q, v)[0] if held else ring_force
                 reaction = on_inner if bearing.inner_body == joint.bodies[0] else -on_inner
             elif joint.kind == "revolute":
                 reaction = -multipliers[where[joint.name]]
@@ -335,7 +336,8 @@ class Multibody(Absolute):
         for bearing in self.bearings:
             prefix = bearing.prefix
             inner, housing, outer = self.play(bearing, q, v)
-            pairs = [("inner", inner - housing)] + ([("outer", outer - housing)] if bearing.outer is not None else [])
+            pairs = [("inner", inner - housing)] if bearing in self.first else []
+            pairs += [("outer", outer - housing)] if bearing.outer is not None else []
             for name, apart in pairs:
                 second = apart.jacobian @ a + apart.rest
                 found |= {f"{prefix}{name}.{axis}": float(s) for axis, s in zip("xy", second, strict=True)}
@@ -359,7 +361,8 @@ class Multibody(Absolute):
         positions, velocities = [], []
         for bearing in self.bearings:
             inner, housing, outer = self.play(bearing, q, v)
-            for apart in [inner - housing] + ([outer - housing] if bearing.outer is not None else []):
+            rings = [inner - housing] if bearing in self.first else []
+            for apart in rings + ([outer - housing] if bearing.outer is not None else []):
                 positions += [*apart.position]
                 velocities += [*apart.velocity]
         if self.free:

@@ -13,6 +13,8 @@ import pytest
 from comparison import drawn, largest_difference, largest_imbalance
 from coupled_scenes import (
     EFFECTS,
+    HUNT,
+    ONE_SIDED,
     SPALLS,
     Derived,
     bearing,
@@ -116,6 +118,17 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         driven_by(MOTOR),
         (bearing("A", effects=SPALLS), bearing("B", "crank", count=2, effects=EFFECTS + SPALLS)),
     ),
+    "press, unlike bearings side by side": (
+        "punching_press",
+        driven_by(MOTOR),
+        (
+            bearing("A", count=2, clearance="14 um", law=ONE_SIDED, balls=7, stiffness=None),
+            bearing("A", elastic=True, effects=EFFECTS + SPALLS, beside="second_"),
+            bearing("B", "rod", elastic=True),
+            bearing("B", "rod", balls=9, angle="15 deg", beside="second_"),
+            bearing("B", "rod", elastic=True, law=HUNT, beside="third_"),
+        ),
+    ),
     "Whitworth": (
         "crank_shaper",
         WHITWORTH,
@@ -131,7 +144,7 @@ def pair(name: str) -> tuple[Derived, Multibody]:
     return derived, Multibody(derived.scene, derived.points())
 
 
-@pytest.mark.parametrize("name", long_but(CASES, "two-way press", "Whitworth"))
+@pytest.mark.parametrize("name", long_but(CASES, "two-way press", "press, unlike bearings side by side"))
 def test_accelerations_and_reactions_are_those_of_absolute_coordinates_with_multipliers(name: str) -> None:
     """Reactions and the drive's torque come out of the balances of the bodies, forces of the balls and housings out of
     deflections, a motor's torque out of its law: that both are equal is a free check."""

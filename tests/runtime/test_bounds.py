@@ -35,6 +35,13 @@ def test_a_number_that_no_scene_may_have_is_refused(
     assert rule in str(caught.value)
 
 
+def test_a_number_of_bearings_is_whole(make_virtual: Callable[..., Model]) -> None:
+    model = make_virtual("punching_press_two_way")
+    assert model.numbers({"bearing.count": 3.0}).values["bearing.count"] == 3.0
+    with pytest.raises(RequestError, match=r"bearing\.count: allowed is a whole number from 1, not 2\.5"):
+        model.numbers({"bearing.count": 2.5})
+
+
 def test_a_member_out_of_bounds_is_reported_and_the_others_kept(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press")
     masses = [2.0, -2.0, 2.5]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -44,6 +45,30 @@ def test_bearings_elsewhere_become_ideal_joints_one_way() -> None:
     assert (left.name, left.joint, left.coupling) == ("main", "A", "one-way")
     assert left.inner is not None
     assert isinstance(left.inner.mass, EquivalentMass)
+
+
+def test_bearings_side_by_side_are_coupled_both_ways_and_share_the_load_one_way(tmp_path: Path) -> None:
+    """Two of one joint that differ: 0.3 and 0.7 of the reaction are no numbers of bearings."""
+
+    def beside(name: str, key: str, numbers: tuple[float, float]) -> Path:
+        text = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
+        start, end = text.index("[bearing]"), text.index("# ---", text.index("[bearing.initial]"))
+        first, second = (
+            re.sub(f"(?m)^{key} = [0-9.]+", f"{key} = {number}", text[start:end]).replace(
+                "[bearing", f"[bearings.{one}"
+            )
+            for one, number in zip("ab", numbers, strict=True)
+        )
+        if key == "count":  # its inner ring starts as that of the first
+            second = re.sub(r"(?m)^inner(_velocity)? = .*\n", "", second)
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text[:start] + first + second + text[end:], encoding="utf-8")
+        return path
+
+    both = read_scene(beside("punching_press", "share", (0.3, 0.7)), coupling="two-way").bearings
+    assert [(b.count.value if b.count else 0, b.beside) for b in both] == [(1.0, ""), (1.0, "a")]
+    both = read_scene(beside("punching_press_two_way", "count", (3, 7)), coupling="one-way").bearings
+    assert [b.share.value if b.share else 0 for b in both] == [0.1, 0.1]
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from stepper_methods import NAMES
 
-from ballpass.runtime import Model
+from ballpass.derive import generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model, load
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.plot.record import gather
 
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
 SHORT = {"cycles": 0.3, "transient": 0}
 
 
@@ -73,7 +80,7 @@ def test_members_in_lanes_are_single_runs(hinges: Model) -> None:
 
 
 TEN = (
-    *("bearing.clearance", "bearing.count", "bearing.damping.ratio", "mechanism.driver.speed"),
+    *("bearing.clearance", "mechanism.bodies.rod.inertia", "bearing.damping.ratio", "mechanism.driver.speed"),
     *("mechanism.bodies.crank.mass", "mechanism.bodies.rod.mass", "mechanism.bodies.slider.mass"),
     *("bearing.outer_ring.mass", "bearing.outer_ring.stiffness", "bearing.outer_ring.damping"),
 )
@@ -104,3 +111,25 @@ def test_sensitivities_are_verified_and_those_of_differences(press: Model) -> No
         slopes = (8.0 * near - far) / (12.0 * step * value)
         own = [derivatives[quantity, name] for quantity in ("peak_ball_force", "rms:inner.y")]
         assert own == pytest.approx(slopes, rel=1e-4, abs=0.0), name
+
+
+@pytest.mark.long
+def test_two_bearings_with_tables_of_their_own_are_a_pair(press: Model, tmp_path: Path) -> None:
+    """Equal, they move as one with count = 2; with outputs of the inner ring under either name, and none of them."""
+    text = (SCENES / "punching_press_two_way.toml").read_text(encoding="utf-8")
+    start, end = text.index("[bearing]"), text.index("# ---", text.index("[bearing.initial]"))
+    table = re.sub(r"(?m)^count = .*\n", "", text[start:end])
+    first, second = (table.replace("[bearing", f"[bearings.{name}") for name in "ab")
+    second = re.sub(r"(?m)^inner(_velocity)? = .*\n", "", second)
+    one = press.simulate(rtol=1e-9, **SHORT)
+    for outputs in ('"*inner.*", "*outer.*", "*ball.*"', '"*.ball.force"'):
+        rest = text[end:].replace('"inner.*", "outer.*", "ball.*"', outputs)
+        scene = scene_from_text(text[:start] + first + second + rest, "press")
+        pair = load(generate(scene, tmp_path / str(len(outputs))))
+        both = pair.simulate(rtol=1e-9, **SHORT)
+        for own, other in (("a.inner.y", "inner.y"), ("b.outer.y", "outer.y"), ("reaction.A.y", "reaction.A.y")):
+            assert np.max(np.abs(both[own] - one[other])) < 1e-6 * np.max(np.abs(one[other]))
+        assert np.max(np.abs(both["b.ball.force"] - one["ball.force"])) < 1e-5 * np.max(one["ball.force"])
+        assert not summarize(pair, both)["warnings"]
+        assert gather(pair, both, pair.manifest.bearings[1]).can_draw_bearing
+    assert ("b.inner.y" in both) is False

@@ -209,7 +209,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
     if bearing.outer is not None:
         start = bearing.initial
         fixed = replace(
-            bearing, outer=None, initial=InitialState(position=start.position[:2], velocity=start.velocity[:2])
+            bearing, outer=None, initial=InitialState(position=start.position[:-2], velocity=start.velocity[:-2])
         )
         yield Feature(
             name=f"outer ring{of}",

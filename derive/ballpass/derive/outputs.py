@@ -5,7 +5,7 @@ In: the derived parts of a model.  Out: `Output` after `Output`, each an express
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 
 import sympy as sp
@@ -15,10 +15,17 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Mechanism
-from ballpass.derive.variables import DRIVER_ANGLE, Output
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output
 
 #: Key of the scene file under which its outputs stand.
 OUTPUTS = "run.outputs"
+
+
+def named_rings(bearing: BearingModel, rate: str = "") -> Iterator[tuple[str, Coordinate]]:
+    """Coordinates of a bearing with the names of its outputs, "b.inner.x" where the coordinate is "a.inner.x" too."""
+    for c in bearing.coordinates:
+        *_, ring, axis = c.name.split(".")
+        yield f"{bearing.names.prefix}{ring}.{rate}{axis}", c
 
 
 def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None) -> list[Output]:
@@ -26,10 +33,9 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     prefix = bearing.names.prefix
     of = f" of {prefix[:-1]}" if prefix else ""
     out: list[Output] = []
-    for c in bearing.coordinates:
-        out.append(Output(name=c.name, expression=c.position, unit=c.unit, description=f"Position {c.description}"))
-    for c in bearing.coordinates:
-        name = c.velocity.name
+    for name, c in named_rings(bearing):
+        out.append(Output(name=name, expression=c.position, unit=c.unit, description=f"Position {c.description}"))
+    for name, c in named_rings(bearing, "v"):
         out.append(
             Output(name=name, expression=c.velocity, unit=f"{c.unit}/s", description=f"Velocity {c.description}")
         )

@@ -21,6 +21,7 @@ from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.outputs import named_rings
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import symbol_of
@@ -131,12 +132,12 @@ def ring_outputs(model: BearingModel) -> list[Output]:
     """Accelerations of the rings' centres."""
     return [
         Output(
-            name=c.name[:-1] + f"a{c.name[-1]}",
+            name=name,
             expression=c.acceleration,
             unit=f"{c.unit}/s^2",
             description=f"Acceleration {c.description}",
         )
-        for c in model.coordinates
+        for name, c in named_rings(model, "a")
     ]
 
 

@@ -8,6 +8,7 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from ballpass.derive.bearing.equations import (
     BearingModel,
     RingMotion,
     derive_bearing,
+    own_coordinates,
     ring_coordinates,
     ring_motion,
 )
@@ -193,7 +195,11 @@ def _linked(
         with _noted(errors):
             forces = derive_forces(mechanism, linkage, drive)
         with _noted(errors):
-            reach = {b.joint: max(b.clearance.value, 0.0) / 2.0 for b in scene.bearings if b.joint is not None}
+            reach: dict[str, float] = {}
+            for b in scene.bearings:
+                if b.joint is not None:
+                    # of several side by side the least play is all that the joint has
+                    reach[b.joint] = min(max(b.clearance.value, 0.0) / 2.0, reach.get(b.joint, math.inf))
             check_assembly(linkage, {q.path: q.value for q in scene.quantities}, reach)
         if forces is None:
             derive_reactions(mechanism, linkage, (), _moments(scene, mechanism))  # for its faults
@@ -251,12 +257,12 @@ def _cage(bearing: Bearing, mechanism: Mechanism, linkage: Linkage) -> Cage:
 def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
     """A linkage whose joints have the play of its bearings, or that a torque drives: one set of equations of motion."""
     drive = drive_of(mechanism.driver)
-    rings = {bearing.name: ring_coordinates(bearing) for bearing in scene.bearings}
-    positions = tuple(c.position for several in rings.values() for c in several)
+    rings = [c for bearing in scene.bearings for c in own_coordinates(bearing)]
+    positions = tuple(c.position for c in rings)
     # the heaviest last: M is factored in this order, without pivoting
-    coordinates = (*(c for several in rings.values() for c in several), *_driven(drive, known=False))
+    coordinates = (*rings, *_driven(drive, known=False))
     joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
-    play = {joints[b.name].name: play_of(b, joints[b.name], rings[b.name]) for b in scene.bearings}
+    play = {joints[b.name].name: play_of(b, joints[b.name], ring_coordinates(b)) for b in scene.bearings}
     linked = _linked(scene, mechanism, drive, play, errors)
     if linked is None:
         return None
@@ -466,7 +472,7 @@ def _system(
             for q in scene.quantities
         ),
         inputs=inputs,
-        coordinates=(*(c for bearing in bearings for c in bearing.coordinates), *driven),
+        coordinates=(*(c for bearing in scene.bearings for c in own_coordinates(bearing)), *driven),
         initial=_initial(scene, driven),
         constants=(*constants, *dict.fromkeys(c for o in named for c in o.constants)),
         definitions=definitions,

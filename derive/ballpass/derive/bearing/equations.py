@@ -127,10 +127,15 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
 
 
 def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
-    """Centres of the rings: of the frame's axes, from where they are unloaded."""
-    names = Names(prefix=bearing.prefix, path=bearing.path)
-    rings = [("inner", "inner ring", "i")] + ([("outer", "outer ring", "o")] if bearing.outer else [])
+    """Centres of the rings: of the frame's axes, from where they are unloaded.
+
+    The inner ring of a bearing beside another one has the coordinates of that.
+    """
+    own = Names(prefix=bearing.prefix, path=bearing.path)
+    first = Names(prefix=f"{bearing.beside}.", path=f"bearings.{bearing.beside}") if bearing.beside else own
+    rings = [("inner", "inner ring", "i", first)] + ([("outer", "outer ring", "o", own)] if bearing.outer else [])
     of = f" of {bearing.name}" if bearing.name else ""
+    partners = {"inner": f"{own.prefix}outer", "outer": f"{first.prefix}inner"}
     return tuple(
         Coordinate(
             name=f"{names.prefix}{ring}.{axis}",
@@ -140,12 +145,17 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
             velocity=names.variable(f"{ring}.v{axis}"),
             latex=names.latex(f"{axis}_{letter}"),
             description=f"of the centre of the {words}{of} along {axis}",
-            group=bearing.path,
-            partner=f"{names.prefix}{'inner' if ring == 'outer' else 'outer'}.{axis}" if bearing.outer else "",
+            group=first.path,
+            partner=f"{partners[ring]}.{axis}" if bearing.outer else "",
         )
-        for ring, words, letter in rings
+        for ring, words, letter, names in rings
         for axis in "xy"
     )
+
+
+def own_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
+    """Those of its rings that no bearing before it has."""
+    return ring_coordinates(bearing)[2 if bearing.beside else 0 :]
 
 
 def _ball(

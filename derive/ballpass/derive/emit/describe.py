@@ -124,6 +124,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             if speed is not None
             else "",
             outer_ring=bearing.outer is not None,
+            beside=bearing.beside,
             damping=mf.DampingInfo(
                 law=bearing.damping.law,
                 **({} if law is None else {"in_deflection": law.in_deflection.value, "in_rate": law.in_rate.value}),

@@ -39,13 +39,16 @@ def recoupled(data: dict[str, Any], coupling: Coupling) -> dict[str, Any]:
     if not changed:
         _refuse(f"no bearing of the scene is coupled otherwise than {coupling}", "a scene with others")
     kept = {}
+    joints = [table.get("joint") for table in changed.values()]
+    side_by_side = sum(parse_quantity(t.get("count", 1), "1") for t in changed.values() if t.get("joint") == driver)
     for name, table in tables.items():
         if name not in changed:
             kept[name] = table
         elif coupling == "two-way":
-            kept[name] = _two_way(table)
+            first = name == next(n for n, other in changed.items() if other.get("joint") == table.get("joint"))
+            kept[name] = _two_way(table, alone=joints.count(table.get("joint")) == 1, first=first)
         elif table.get("joint") == driver:
-            kept[name] = _one_way(table)
+            kept[name] = _one_way(table, side_by_side)
     if not kept:
         _refuse(f"no bearing is at the driver's joint {driver}", "a bearing there, which the paper's model can load")
     run = {**data.get("run", {}), "outputs": ["drive_torque"]}
@@ -54,17 +57,18 @@ def recoupled(data: dict[str, Any], coupling: Coupling) -> dict[str, Any]:
     return {**rest, "title": title, "run": run, **({"bearings": kept} if several else {"bearing": kept[""]})}
 
 
-def _one_way(table: dict[str, Any]) -> dict[str, Any]:
+def _one_way(table: dict[str, Any], side_by_side: float) -> dict[str, Any]:
     if table.get("inner_ring", {}).get("body") == FRAME:
         _refuse("the inner ring does not turn with the driver", "an inner ring on the driven body")
-    count = parse_quantity(table.get("count", 1), "1")
     rest = {key: value for key, value in table.items() if key not in ("coupling", "count")}
-    return {**rest, "share": 1.0 / count, "inner_ring": _LEVER_RULE}
+    return {**rest, "share": 1.0 / side_by_side, "inner_ring": _LEVER_RULE}
 
 
-def _two_way(table: dict[str, Any]) -> dict[str, Any]:
-    share = parse_quantity(table.get("share", 1), "1")
+def _two_way(table: dict[str, Any], *, alone: bool, first: bool) -> dict[str, Any]:
+    share = parse_quantity(table.get("share", 1), "1") if alone else 1.0
     rest = {key: value for key, value in table.items() if key not in ("share", "inner_ring")}
+    if not first and isinstance(rest.get("initial"), dict):  # its inner ring moves as that of the first
+        rest["initial"] = {key: value for key, value in rest["initial"].items() if not key.startswith("inner")}
     return {**rest, "coupling": "two-way", "count": 1.0 / share}
 
 

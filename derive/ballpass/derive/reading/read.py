@@ -24,7 +24,7 @@ from ballpass.derive.reading.read_duty import duty_faults, read_duty
 from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.values import parse_override, replaced, value_faults, with_values
-from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.bearing_records import Bearing, InitialState
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
@@ -294,7 +294,35 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
         bearing = read_bearing(table, mechanism, driven, name)
         bearings.append(_marked(bearing, Names(prefix=bearing.prefix, path=bearing.path)))
     _check_couplings(root, bearings)
-    return tuple(bearings)
+    return tuple(_beside(root, bearing, bearings[:k]) for k, bearing in enumerate(bearings))
+
+
+def _beside(root: Table, bearing: Bearing, before: Sequence[Bearing]) -> Bearing:
+    """A bearing whose inner ring moves as that of another one at the joint, where there is one; coupled two-way."""
+    first = next((b for b in before if b.coupling == bearing.coupling == "two-way" and b.joint == bearing.joint), None)
+    if first is None:
+        return bearing
+    if bearing.inner_body != first.inner_body:
+        root.fault(
+            f"bearings.{bearing.name}.inner_ring",
+            f"joint {show(bearing.joint)}: the inner ring of {first.name} is on the other body",
+            given=f"{show(first.inner_body)}, {show(bearing.inner_body)}",
+            allowed="bearings side by side: all inner rings of a joint on one body",
+            remedy=f'write body = "{first.inner_body}" in its table inner_ring',
+        )
+    given = root.data["bearings"][bearing.name].get("initial")
+    for key in ("inner", "inner_velocity"):
+        if isinstance(given, dict) and key in given:
+            root.fault(
+                f"bearings.{bearing.name}.initial.{key}",
+                f"its inner ring moves as that of the bearing {first.name} beside it",
+                given=show(given[key]),
+                allowed=f"an initial state of bearings.{first.name} alone",
+                remedy="delete the key",
+            )
+    start = bearing.initial
+    own = InitialState(position=start.position[2:], velocity=start.velocity[2:])
+    return replace(bearing, beside=first.name, initial=own)
 
 
 def _one_or_several(root: Table, one: str, example: str) -> Iterator[tuple[Table, str]]:
@@ -324,26 +352,17 @@ def _marked(record: T, names: Names) -> T:
 
 
 def _check_couplings(root: Table, bearings: Sequence[Bearing]) -> None:
-    """All bearings one-way or all two-way, and of these one at each joint."""
+    """All bearings one-way or all two-way."""
     one_way = [b.name for b in bearings if b.coupling == "one-way"]
-    two_way = [b for b in bearings if b.coupling == "two-way"]
+    two_way = [b.name for b in bearings if b.coupling == "two-way"]
     if one_way and two_way:
         root.fault(
             f"bearings.{one_way[0]}",
             "a bearing loaded one-way takes the reaction of an ideal linkage, and others give this linkage play",
-            given=f"one-way: {listing(one_way)}; two-way: {listing([b.name for b in two_way])}",
+            given=f"one-way: {listing(one_way)}; two-way: {listing(two_way)}",
             allowed="one coupling for all bearings of a scene",
             remedy='give all of them coupling = "two-way", or none',
         )
-    for k, bearing in enumerate(two_way):
-        if any(bearing.joint == other.joint for other in two_way[:k]):
-            root.fault(
-                f"bearings.{bearing.name}",
-                "another bearing gives this joint its play",
-                given=f"joint {show(bearing.joint)}",
-                allowed="one bearing coupled two-way at a joint, count for equal ones side by side",
-                remedy="write count = 2 at the other one and delete this one",
-            )
 
 
 def _read_loads(root: Table, *, required: bool) -> tuple[Load, ...]:

@@ -65,7 +65,7 @@ def read_count(table: Table, coupling: str) -> SceneNumber | None:
             "this is no number of bearings",
             given=show(table.data.get("count")),
             allowed="a whole number from 1",
-            remedy="write count = 2 for a pair; bearings that differ are at joints of their own",
+            remedy="write count = 2 for a pair; bearings that differ have tables of their own",
         )
     return count
 

@@ -365,7 +365,7 @@ class Bearing:
     joint whose reaction loads it (None without mechanism).
     `coupling` one-way: `share` is the part of the ideal reaction it takes, `inner` what moves with the inner ring.
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
-    stand side by side (None: one).
+    stand side by side (None: one); `beside` names the first of several at the joint, whose inner ring moves alike.
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication` and `alignment` are None where the
@@ -400,8 +400,15 @@ class Bearing:
         )
     )
     inner_body: str = ""
+    beside: str = ""
     count: SceneNumber | None = positive(
-        "1", "Bearings side by side at the joint", "n_b", 2, optional=True, when="two-way: default 1, else refused"
+        "1",
+        "Bearings side by side at the joint",
+        "n_b",
+        2,
+        optional=True,
+        when="two-way: default 1, else refused",
+        note="a whole number; those that differ have tables of their own",
     )
     balls: int = declared(
         WholeKey(

@@ -136,7 +136,7 @@ def _unusual(sol: Solution) -> list[str]:
         ball = sol.parameters[f"{bearing.path}.ball_diameter"]
         known = {**sol.parameters, **sol.constants}
         outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
-        apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
+        apart = np.hypot(*(sol[bearing.inner_state(axis)] - o for axis, o in zip("xy", outer, strict=True)))
         displacement = float(np.max(apart))
         deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
         limit = passed_limit(ball, deflection, displacement)

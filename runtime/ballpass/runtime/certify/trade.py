@@ -18,7 +18,7 @@ import numpy as np
 
 from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, stepper_run
 from ballpass.runtime.certify.trade_report import PROMISED, Measured, Trade
-from ballpass.runtime.contract.bounds import outside, violations
+from ballpass.runtime.contract.bounds import counts, outside, violations
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.method_registry import AUTO, CHOICE, METHODS, STEPPERS
 from ballpass.runtime.contract.tableaus import RosenbrockTableau
@@ -65,18 +65,20 @@ def perturbed(
 ) -> list[dict[str, float]]:
     """Parameter sets around some numbers: every one that is not zero, drawn evenly from its neighbourhood.
 
-    The times of a load's table stay: drawn one by one they would change places where the load is steep.  A number that
-    is not allowed is mirrored at the user's, which may lie on its bound.
+    Numbers of bearings stay, and the times of a load's table: drawn one by one they would change places where the load
+    is steep.  A number that is not allowed is mirrored at the user's, which may lie on its bound.
     """
     random = np.random.default_rng(seed)
     manifest = model.manifest
     times = {name for item in manifest.inputs for name in item.times}
-    sets = {}
+    sets, whole = {}, counts(manifest)
     for info in manifest.parameters:
         middle = around[info.name]
         if middle == 0.0 or info.name in times:
             continue
         values = middle * (1.0 + spread * random.uniform(-1.0, 1.0, count))
+        if info.name in whole:
+            continue
         values = np.where(outside(info, values), 2.0 * middle - values, values)
         sets[info.name] = np.where(outside(info, values), middle, values)
     for bad, _ in violations(manifest, {name: sets.get(name, np.full(count, v)) for name, v in around.items()}):

@@ -52,6 +52,12 @@ def outside(info: Bounded, values: Any) -> Any:
     return not within if isinstance(values, float) else ~within
 
 
+def counts(manifest: Manifest) -> tuple[str, ...]:
+    """Parameters that are numbers of bearings; derivatives treat them as any other."""
+    known, own = {info.name for info in manifest.parameters}, (f"{b.path}.count" for b in manifest.bearings)
+    return tuple(name for name in own if name in known)
+
+
 def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> Iterator[tuple[np.ndarray, str]]:
     """Masks of values that are not allowed, each with the allowed ones in words.
 
@@ -64,6 +70,10 @@ def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) ->
         # an array for each of forty numbers would take longer than a short run
         if bad if isinstance(bad, bool) else bad.any():
             yield np.asarray(bad), f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
+    for name in counts(manifest):
+        bad = np.asarray(columns[name], dtype=float) % 1.0 != 0.0
+        if bad.any():
+            yield bad, f"{name}: allowed is a whole number from 1"
     for name, factor, other in manifest.relations:
         bad = ~(np.asarray(columns[name], dtype=float) > factor * np.asarray(columns[other], dtype=float))
         if bad.any():

@@ -258,7 +258,8 @@ class BearingInfo:
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
     `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
     whether the inner ring makes no whole turns; `inner_turns` names the constant with the number of its whole turns in
-    a turn of the driver, where that decides.
+    a turn of the driver, where that decides; `beside` names the first of several two-way bearings of a joint, whose
+    inner rings move alike.
     """
 
     name: str
@@ -275,7 +276,12 @@ class BearingInfo:
     element: str = "ball"
     inner_stands: bool = False
     inner_turns: str = ""
+    beside: str = ""
     alignment: AlignmentInfo | None = None
+
+    def inner_state(self, name: str) -> str:
+        """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""
+        return f"{f'{self.beside}.' if self.beside else self.prefix}inner.{name}"
 
     def stands_inside(self, values: Mapping[str, Any]) -> Any:
         """Whether the inner ring makes no whole turns at these parameters and constants, numbers or arrays."""

@@ -76,8 +76,11 @@ class Record:
 
     def output(self, name: str) -> str:
         """Name of an output or state of this bearing: "inner.x" may be "left.inner.x"."""
-        ours = self.bearing is not None and name.startswith(("inner.", "outer.", "ball.", "load.", "ring_force."))
-        return f"{self.bearing.prefix}{name}" if self.bearing is not None and ours else name
+        if self.bearing is None or not name.startswith(("inner.", "outer.", "ball.", "load.", "ring_force.")):
+            return name
+        own = f"{self.bearing.prefix}{name}"
+        ring = name.startswith("inner.") and own not in self.solution
+        return self.bearing.inner_state(name.removeprefix("inner.")) if ring else own
 
     def has(self, *names: str) -> bool:
         """Whether all these outputs were kept, of this bearing where bearings have them."""

@@ -164,7 +164,7 @@ def _bearing(
         "cosine": place.get(f"{bearing.path}.cos_contact_angle"),
         "gap": place.get(f"{bearing.path}.radial_gap"),
         "limits": limit_templates(bearing),
-        "inner": pair(own("inner")),
+        "inner": pair(bearing.inner_state("x").removesuffix(".x")),
         "outer": pair(own("outer")),
         "load": load,
         "life": _life(bearing, place) if force.endswith("ball.force") else None,

@@ -37,7 +37,8 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     rest = static_equilibrium(model, numbers, t=time)
     names = [] if chain is None else [*chain.names, "time"]
     if quantity.kind == "static_deflection":
-        inner = [rest.coordinates.index(f"{quantity.channel}inner.{axis}") for axis in "xy"]
+        info = next(one for one in model.manifest.bearings if one.prefix == quantity.channel)
+        inner = [rest.coordinates.index(info.inner_state(axis)) for axis in "xy"]
         place = rest.positions[inner]
         value, ball = float(np.hypot(*place)), None
         rows = rest.derivative("positions", names)[inner] if names else np.zeros((2, 1))
