@@ -53,8 +53,8 @@ def animate(
 ) -> None:
     """Simulate a scene and write its last turn as a moving picture: linkage, bearings, forces and signals.
 
-    The page has a slider, ball forces as colours, arrows of the reactions, and signals with a cursor. Open it in a
-    browser; its address takes an angle of the turn: animation.html#angle=90.
+    The page has a slider, ball forces as colours, arrows of the reactions, and signals with a cursor.
+    Open it in a browser; its address takes an angle: animation.html#angle=90.
     """
     with command(scene) as stages:
         stages("read")

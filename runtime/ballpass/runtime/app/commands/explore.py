@@ -26,8 +26,8 @@ _COMPONENTS = {"x": 0, "y": 1}
 def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> None:
     """Write a scene as a page with the solver in it: move a number, and curves and peaks follow.
 
-    The page is one file. It needs no server, no network and no installation where it is opened. Its address carries the
-    numbers that were changed: explore.html#bearing.clearance=30 um.
+    The page is one file. It needs no server, no network and no installation where it is opened.
+    Its address carries the numbers that were changed: explore.html#bearing.clearance=30 um.
     """
     with command(scene) as stages:
         from ballpass.runtime.export.web_assembly import check_compiler
