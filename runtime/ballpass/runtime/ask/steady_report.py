@@ -76,8 +76,13 @@ def contact_facts(contacts: ContactSequence) -> dict[str, Any]:
     }
 
 
-def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange) -> ReportTable:
-    """Ends of the branches, the points at which the kind of the states changes, and where contacts do."""
+def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange, resolution: float) -> ReportTable:
+    """Ends of the branches, the points at which the kind of the states changes, and where contacts do.
+
+    Parameters
+    ----------
+    resolution : size below which a multiplier is not known from zero
+    """
     rows = []
     for branch in branches:
         listed = {id(one): other for one, other in branch.contact_changes[:LISTED]}
@@ -86,6 +91,8 @@ def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange) -> Repo
             value = f"{point.value / over.factor:.9g}"
             first = complex(point.multipliers[0])
             largest = f"{abs(first):.6g}, of a pair" if first.imag else complex_words(first)
+            if abs(first) <= resolution:
+                largest = f"below {resolution:.0e}"
             if what:
                 rows.append((str(branch.repeats), value, what, largest))
             if id(point) in listed:

@@ -212,7 +212,7 @@ class SteadyState(ShortRepr, Reported):
         if self.sooner < self.repeats:
             parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")
         if self.over is not None:
-            parts.append(branch_table(self.branches, self.over))
+            parts.append(branch_table(self.branches, self.over, self.resolution))
             parts += [branch_words(branch) for branch in self.branches]
         warnings = [*self.notes]
         if self.over is not None:
