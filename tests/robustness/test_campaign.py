@@ -128,12 +128,13 @@ def test_mutated_scenes_end_in_words(seed: int, tmp_path: Path, monkeypatch: pyt
     [
         ("trade SCENE --members 1000000000", 2),
         ("stream SCENE --out x.nc --sample-rate 1e9Hz --cycles 1e9", 2),
+        ("dataset DATA_SET --out x.nc --workers 1000000000", 2),  # as many processes were started
     ],
 )
 def test_what_is_too_large_is_refused(words: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    scene = str(SCENES / "varying_compliance.toml")
-    assert ends_in_words([scene if word == "SCENE" else word for word in words.split()]) == code
+    files = {"SCENE": SCENES / "varying_compliance.toml", "DATA_SET": SCENES / "data_sets" / "bearing_faults.toml"}
+    assert ends_in_words([str(files.get(word, word)) for word in words.split()]) == code
     assert not (tmp_path / "x.nc").exists()
 
 

@@ -41,6 +41,9 @@ PATIENCE = 60.0
 AHEAD = 4
 
 
+#: Workers that may be asked for on this machine, each a process, where it has fewer processors.
+MOST_WORKERS = 64
+
 #: Settings of workers on this machine.  Dask's own environment lets the C library give back freed memory at once, and
 #: each signal then takes its pages from the system anew: half as long again, measured.  Profiles are not needed.
 LOCAL = {
@@ -197,7 +200,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     Raises
     ------
     RequestError
-        Both are given, no scheduler answers, or Dask is not installed.
+        Both are given, more workers than make sense, no scheduler answers, or Dask is not installed.
     """
     if scheduler is None and workers is None:
         yield None
@@ -207,8 +210,9 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             f"--scheduler {scheduler} and --workers {workers} were both given. Allowed: one of them: workers of a "
             "scheduler that runs, or a cluster on this machine."
         )
-    if workers is not None and workers < 1:
-        raise RequestError(f"--workers: {workers} was given. Allowed: a whole number from 1 on.")
+    most = max(MOST_WORKERS, os.cpu_count() or 1)
+    if workers is not None and not 1 <= workers <= most:
+        raise RequestError(f"--workers: {workers} was given. Allowed: a whole number from 1 to {most}.")
     distributed = need("dask.distributed")
     if workers is not None:
         with (
