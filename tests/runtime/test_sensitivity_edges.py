@@ -1,4 +1,4 @@
-"""Sensitivities where loads switch at times that move with a parameter."""
+"""Sensitivities where loads switch at times that move with a parameter, and where a ball only touches."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from ballpass.runtime import Model
 from ballpass.runtime.certify.certificate import Verdict
@@ -48,3 +49,23 @@ def test_the_peak_of_a_load_at_the_edge_of_its_window_moves_with_it(model: Model
     values = [model.evaluate(peak.time + later * k, outputs=["reaction.A.y"])["reaction.A.y"] for k in (1, 2)]
     slope = (float(values[1]) - float(values[0])) / (later * speed)
     assert report["max:reaction.A.y", MOVING[0]].derivative == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.long
+def test_where_a_ball_only_touches_derivatives_are_right(make_model: Callable[..., Model]) -> None:
+    """Preload is relieved behind the load: at one clearance balls are just relieved in passing."""
+    model = make_model("varying_compliance")
+    deflection = "min:ball.deflection[1]"
+
+    def least(clearance: float) -> float:
+        numbers = {"bearing.inner_ring.damping": 4e5, "bearing.clearance": clearance}
+        return model.quantities(deflection, 3.0, transient=0.3, parameters=numbers)[deflection].value
+
+    touching = brentq(least, -20e-6, -0.1e-6, xtol=1e-12)
+    assert abs(least(touching)) < 1e-11
+    numbers = {"bearing.inner_ring.damping": 4e5, "bearing.clearance": touching}
+    asked = ["max:ball.force", "rms:inner.y", "range:inner.y", "mean:inner.x", "end:inner.y"]
+    by = ["load.force.x", "bearing.clearance", "shaft.speed"]
+    report = model.sensitivity(asked, by, 3.0, transient=0.3, parameters=numbers)
+    assert len(report.grazing) > 0
+    assert report.verdicts[Verdict.VERIFIED] == len(report.pairs)

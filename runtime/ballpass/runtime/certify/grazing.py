@@ -1,10 +1,10 @@
-"""Moments at which a trajectory touches a kink of a law instead of crossing it: derivatives are unreliable there.
+"""Moments at which a trajectory touches a kink of a law instead of crossing it: derivatives change fast there.
 
 In: deflections of the balls along a run.  Out: `Grazing` records.
 
 A ball that crosses into contact does so at a moment that moves smoothly with every parameter.  One whose deflection has
-an extreme near zero may touch or not after the smallest change: derivatives exist on either side, grow without bound
-towards it, and differ.  The same holds for the rate of deflection under a law that damps one way only.
+an extreme near zero may touch or not after the smallest change: first derivatives are continuous, and second ones grow
+without bound on one side.  The same holds for the rate of deflection under a law that damps one way only.
 """
 
 from __future__ import annotations
