@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from ballpass.runtime import Model
 from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.point.equilibrium import FreeRingWarning
+from ballpass.runtime.point.equilibrium import FreeRingWarning, StaticEquilibrium
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
 HERTZ = """inner_groove_radius = "4.1275 mm"
@@ -149,6 +149,32 @@ def test_implicit_derivative_agrees_with_extrapolated_differences(press: Model, 
     noise = 1e-7 * float(np.max(np.abs(first)))
     assert first == pytest.approx(second.value, rel=1e-7, abs=noise)
     assert np.any(first != 0.0)
+
+
+@pytest.mark.parametrize(
+    "name", ["start_angle", "table.time.1", "table.time.2", "table.speed.1", "table.speed.2", "table.speed.3", "time"]
+)
+def test_derivatives_follow_a_driver_whose_angle_is_a_state(make_virtual: Callable[..., Model], name: str) -> None:
+    table = 'table = { time = ["1 ms", "30 ms", "200 ms"], speed = ["100 rpm", "400 rpm", "700 rpm"] }'
+    model, t, path = make_virtual("punching_press", ('speed = "500 rpm"', table)), 0.02, f"mechanism.driver.{name}"
+    rest = model.static_equilibrium(t)
+    here = t if name == "time" else model.parameters[path]
+    step = 1e-4 * (here or 1.0)
+
+    def beside(side: float) -> StaticEquilibrium:
+        moved = here + side * step
+        return (
+            model.static_equilibrium(moved) if name == "time" else model.static_equilibrium(t, parameters={path: moved})
+        )
+
+    above, below = beside(1.0), beside(-1.0)
+    by = "time" if name == "time" else path
+    for found, one, other in (
+        (rest.derivative("positions", by), above.positions, below.positions),
+        (rest.derivative("ball.elastic_force", by), above.ball_force, below.ball_force),
+    ):
+        differences = (one - other) / (2.0 * step)
+        assert found == pytest.approx(differences, rel=1e-4, abs=1e-5 * float(np.max(np.abs(differences)) + 1e-300))
 
 
 def test_a_given_load_does_not_move_with_the_machine(press: Model) -> None:

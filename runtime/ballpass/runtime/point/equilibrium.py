@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
-from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, Manifest
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
+from ballpass.runtime.point.jacobian import RHS, TIME, JacobianDirections, Rows, contract, directions_of, rows_of
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
@@ -41,6 +41,9 @@ ITERATIONS, FAR = 400, 1.0
 
 #: Largest angle of crank or shaft that is taken as radians: a larger one probably means degrees [rad].
 LARGEST_ANGLE = 4.0 * math.pi
+
+#: Part of a number by which it is moved to see angle and speed of a driver change [1].
+DRIVER_STEP = 1e-6
 
 #: Stiffness below this fraction of the largest counts as none.
 FREE = 1e-9
@@ -172,21 +175,22 @@ class StaticEquilibrium(Reported):
                 "static equilibrium: a ring is free to move along some direction, so that its place is not a function "
                 "of the parameters. Give a preload, or another instant or ball angle."
             )
-        directions = directions_of(self.model, self.numbers, wrt, self.time)
+        directions = _with_driver(self.model, self.numbers, self.time, names)
         there = point(self.model, self.numbers, self.time, self.x)
         moved = contract(self.model, _force_rows(self.model), directions, there)
         if self.load_is_given:
             (load,) = rows_of(self.model, _loads(self.model))
             moved[_loaded(self.model)] -= contract(self.model, load, directions, there)
-        moved[held_coordinates(self.model)] = 0.0
+        half, held = len(self.coordinates), held_coordinates(self.model)
+        moved[held] = 0.0
         slopes = np.linalg.solve(self.stiffness, moved)
         if of == "positions":
+            slopes[held] = directions.x[:half][held]
             total = slopes
         else:
             if of == RHS:
                 raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
             parts = []
-            half = len(self.coordinates)
             for rows in rows_of(self.model, of):
                 part = contract(self.model, rows, directions, there)
                 name = f"{rows.function}_jac_x"
@@ -196,6 +200,35 @@ class StaticEquilibrium(Reported):
                 parts.append(part)
             total = np.concatenate(parts)
         return np.asarray(total[:, 0] if isinstance(wrt, str) else total)
+
+
+def _with_driver(model: LoadedModel, numbers: Numbers, t: float, names: Sequence[str]) -> JacobianDirections:
+    """Directions along which the driver moves as well, where its angle and speed are states.
+
+    Their derivatives by parameters and time are differences of closed forms.
+    """
+    directions = directions_of(model, numbers, names, t)
+    held, mechanism = np.flatnonzero(held_coordinates(model)), model.manifest.mechanism
+    if not len(held) or mechanism is None:
+        return directions
+    driver_at, x = driver_angle.driver_at, directions.x.copy()
+    tables = [item for item in model.manifest.inputs if item.name == DRIVER_ACCELERATION]
+    used = dict.fromkeys(
+        [mechanism.start_angle, mechanism.speed, *(name for item in tables for name in (*item.times, *item.values))]
+    )
+    for column, name in enumerate(names):
+        at = t if name == TIME else numbers.values[name] if name in used else None
+        if at is None:
+            continue
+        step = DRIVER_STEP * (abs(at) or 1.0)
+        later, before = (
+            np.array(driver_at(model.manifest, numbers.values, at + side))
+            if name == TIME
+            else np.array(driver_at(model.manifest, {**numbers.values, name: at + side}, t))
+            for side in (step, -step)
+        )
+        x[[held[0], len(model.states) // 2 + held[0]], column] = (later - before) / (2.0 * step)
+    return replace(directions, x=x)
 
 
 def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: float | None) -> float:
