@@ -164,12 +164,14 @@ def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str
         for key, words in _RUN.items()
         if key in summary and summary[key]["value"] is not None
     ]
-    laws = ", ".join(
-        f"{key.removesuffix('damping_law').replace('.', ' ')}{law}"
+    laws = {
+        key.removesuffix("damping_law").removesuffix("."): law
         for key, law in summary.items()
         if key == "damping_law" or key.endswith(".damping_law")
-    )
-    law = [f"damping law {laws}"] if laws else []
+    }
+    alike = len(set(laws.values())) == 1
+    each = [next(iter(laws.values()))] if alike else [f"{law} in {bearing}" for bearing, law in laws.items()]
+    law = [f"damping law {', '.join(each)}"] if laws else []
     if uncertain:
         law.append("± twice the standard deviation over moved starts, or the distance from their mean")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
