@@ -80,6 +80,10 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
             }
         )
     noun = _noun(scene.bearings)
+
+    def worded(text: str) -> str:
+        return re.sub(r"\bball(s?)\b", rf"{noun}\1", text)
+
     absent = [*_absent(scene), *_NEVER, *_of_drive(scene)]
     return {
         "scene": scene.name,
@@ -87,8 +91,8 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "title": scene.title,
         "file": str(path),
         "modelled": parts,
-        "not_modelled": [re.sub(r"\bball(s?)\b", rf"{noun}\1", text) for text in absent],
-        "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
+        "not_modelled": [worded(text) for text in absent],
+        "functions": {f.name: {"operations": f.operations, "what": worded(f.description)} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
         **said.to_json(),
     }
