@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
+from ballpass.runtime.quantity.characteristic import characteristic_lines, names_of
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.run.solution_file import load_solution
 
@@ -48,6 +49,18 @@ def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make
     long = model.spectrum("inner.x", orders=True)
     assert long.alternatives[long.names.index("4 shaft")] == ""
     assert long.resolution == pytest.approx(0.01)
+
+
+def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:
+    """In 27 turns a line of the healthy rotor lay nearer to 2 BSF + 3 FTF of the other bearing."""
+    model = make_model("rotor_two_bearings")
+    values = model.numbers().values
+    lines = characteristic_lines(model.manifest, values)
+    of = {line.label: line.frequency for line in lines}
+    first, *_ = names_of(251.9, lines, of["shaft"] / 27)
+    assert first.words == "2 BPFO pulley - shaft"
+    damage, *_ = names_of(of["BPFI pulley"] + 0.1, lines, of["shaft"] / 27)
+    assert damage.words == "BPFI pulley"
 
 
 def test_lines_of_the_shaft_are_at_its_frequency_and_not_a_sample_below(make_model: Callable[..., Model]) -> None:

@@ -151,6 +151,7 @@ class LineName:
     rank : how far from simple the words are
     beside : distance from the line of the spectrum, in lines of the spectrum [1]
     of_shaft : whether it is the shaft alone
+    of_load : whether it is of balls that pass the load, as those of a healthy bearing do
     """
 
     words: str
@@ -158,13 +159,15 @@ class LineName:
     rank: int
     beside: float
     of_shaft: bool
+    of_load: bool
 
 
 def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> tuple[LineName, ...]:
     """What a line of a spectrum is, then as simple names that the record cannot tell from it; empty for nothing.
 
     The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
-    name of a bearing from a multiple of the shaft, the shaft wins.
+    name of a bearing from a multiple of the shaft, the shaft wins.  So does a simpler name of balls that pass the load,
+    as those of a healthy bearing do, against one of damage.
 
     Parameters
     ----------
@@ -182,12 +185,22 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
             found = k * line.frequency + m * line.side
             beside = abs(frequency - found) / resolution
             if (1 <= k <= most or (of_shaft and k >= 1)) and beside <= 1.0 + 1e-9:
-                words, rank = _words(k, m, line), k + 3 * abs(m)
-                fits.append(LineName(words=words, frequency=found, rank=rank, beside=beside, of_shaft=of_shaft))
+                fits.append(
+                    LineName(
+                        words=_words(k, m, line),
+                        frequency=found,
+                        rank=k + 3 * abs(m),
+                        beside=beside,
+                        of_shaft=of_shaft,
+                        of_load=line.name == "BPFO",
+                    )
+                )
     if not fits:
         return ()
     fits.sort(key=lambda name: (not name.of_shaft, name.beside + COMPLICATED * name.rank, name.words))
-    first, *others = fits
+    healthy = [name for name in fits if name.of_load and name.rank < fits[0].rank and not fits[0].of_shaft]
+    first = healthy[0] if healthy and not fits[0].of_load else fits[0]
+    others = [name for name in fits if name is not first]
     simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
     near = [name for name in others if not name.of_shaft and name.rank <= simple]
     return (first, *near[:MOST_NEAR])
