@@ -277,6 +277,24 @@ def test_a_load_that_rises_is_drawn_as_large_as_it_is(
 @needs_browser
 @needs_compiler
 @pytest.mark.long
+def test_means_of_a_machine_that_runs_up_take_as_many_samples_a_turn_where_it_is_fastest(
+    make_model: Callable[..., Model], browser: Page, tmp_path: Path
+) -> None:
+    """The scene's samples are of a turn at the speed of t = 0, and of the whole run where that is none."""
+    table = 'table = { time = ["0 s", "0.8 s"], speed = ["0 rpm", "600 rpm"] }'
+    length = ("cycles = 4 ", 'duration = "1 s" '), ("transient_cycles = 2 ", "transient_cycles = 0 ")
+    model = make_model("punching_press", ('speed = "500 rpm"', table), *length)
+    browser.open(model.explore(tmp_path / "page.html"))
+    found = shown(browser)
+    rms = model.quantities(["rms:ball.force"])["rms:ball.force"].value
+    assert found["rms_ball_force"] == pytest.approx(rms, rel=1e-3)
+    (bearing,) = model.life().bearings
+    assert found["life"] == pytest.approx(min(bearing.hours(turns) for turns in bearing.lives.values()), rel=3e-3)
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
 def test_work_and_spectrum_of_a_run_that_ends_within_a_turn_are_those_of_whole_turns(
     make_model: Callable[..., Model], browser: Page, tmp_path: Path
 ) -> None:

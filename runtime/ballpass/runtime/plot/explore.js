@@ -198,7 +198,7 @@ function drawLoad(bearing, number) {
 // Amplitudes of the rings' motion at whole parts of the record's frequency, as far as 40 a turn; Hann's window where turns hold no whole period.
 function spectrumOf(run, number) {
   const bearing = solver.bearings[number], turns = run.turn < Infinity ? Math.min(Math.floor((run.rows.at(-1)[0] - run.rows[0][0]) / run.turn + 1e-6), 4) : 0;
-  const size = turns ? Math.round(turns * solver.run.samples) : run.rows.length - 1, from = run.rows.length - 1 - size, lines = Math.min(40 * (turns || 5), Math.floor(size / 2)), hann = !solver.linkage;
+  const size = turns ? Math.round(turns * run.turn / run.whole * run.parts) : run.rows.length - 1, from = run.rows.length - 1 - size, lines = Math.min(40 * (turns || 5), Math.floor(size / 2)), hann = !solver.linkage;
   const motion = run.rows.slice(from, from + size).map((row) => motionOf(bearing, row));
   const middle = [0, 1].map((axis) => motion.reduce((sum, one) => sum + one[axis], 0) / size);
   const [xs, ys] = [0, 1].map((axis) => Float64Array.from(motion, (one, k) => (one[axis] - middle[axis]) * (hann ? 1 - Math.cos(TURN * k / size) : 1)));

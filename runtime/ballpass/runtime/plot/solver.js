@@ -42,6 +42,10 @@ function readRows(blocks, whole, parts, first, count) {
   return blocks.at(-1).rows.slice(0, count);
 }
 
+// How many times as many samples are taken as the scene says, which counts turns at the speed of t = 0; most samples of a run then.
+let finer = 1;
+const MOST = 40000;
+
 // A run of these numbers, or null where `stale` says that it is not wanted any more: its steady samples, row after row.
 async function solve(values, stale) {
   machine.ballpass_stop(machine.one);
@@ -50,7 +54,7 @@ async function solve(values, stale) {
   must(machine.ballpass_start(machine.one, 0));
   const known = inMemory(machine.ballpass_values(machine.one), solver.places).slice(), { cycles, duration, transient, samples } = solver.run;
   const speed = solver.speed === null ? 0 : known[solver.speed], turn = speed ? TURN / Math.abs(speed) : Infinity;
-  const whole = cycles ? cycles * turn : duration, count = Math.max(1, Math.round(samples * (turn < Infinity ? whole / turn : 1)));
+  const whole = cycles ? cycles * turn : duration, base = Math.max(1, Math.round(samples * (turn < Infinity ? whole / turn : 1))), count = finer * base;
   if (transient && !speed) throw new Error("Transient cycles are turns, and nothing turns in this run.");
   const time = (k) => whole * (k / count), least = transient ? transient * turn * (1 - 1e-12) : 0;
   let first = 0, began = performance.now();
@@ -80,6 +84,16 @@ async function solve(values, stale) {
       await new Promise((go) => { setTimeout(go); });
       if (stale()) return null;
       began = performance.now();
+    }
+  }
+  if (solver.angle !== null) { // so many samples a turn where the driver is fastest, as means over the run need
+    let step = 0;
+    for (let k = 1; k < rows.length; k += 1) step = Math.max(step, Math.abs(rows[k][solver.angle] - rows[k - 1][solver.angle]));
+    const wanted = Math.min(Math.round(finer * step * samples / TURN), Math.floor(MOST / base));
+    if (wanted > finer) {
+      finer = wanted;
+      spare.push(...blocks);
+      return solve(values, stale);
     }
   }
   machine.ballpass_ratings(machine.one, machine.ratings);
