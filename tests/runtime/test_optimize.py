@@ -12,6 +12,7 @@ from scipy.optimize import rosen, rosen_der
 from ballpass.runtime import Model, QuantityFunction, RequestError
 from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes
 from ballpass.runtime.ask.interior_point import minimize_by_ipopt
+from ballpass.runtime.ask.limits import read_limits
 
 Search = Callable[[Callable[[np.ndarray], Plane], np.ndarray], BundleMinimum]
 searches = pytest.mark.parametrize("minimized", [minimize_by_planes, minimize_by_ipopt])
@@ -98,6 +99,14 @@ def test_the_least_peak_of_the_press_over_housing_damping_is_the_kink_of_an_inde
     assert per_decade[0] == pytest.approx(-1565.0, rel=0.01)
     assert per_decade[-1] == pytest.approx(700.0, rel=0.01)
     assert "disagrees" not in dict(found.verdicts).values()
+
+
+def test_hours_of_a_life_are_turns_at_the_speed_of_the_inner_ring(make_model: Callable[..., Model]) -> None:
+    press, texts = make_model("punching_press"), ["life >= 20000 h"]
+    (limit,) = read_limits(press.manifest, "subject_to", texts, press, None, ["bearing.clearance"])
+    assert limit.limit == pytest.approx(20000 * 60 * 500)  # 500 rpm
+    with pytest.raises(RequestError, match="not one number"):
+        read_limits(press.manifest, "subject_to", texts, press, None, ["mechanism.driver.speed"])
 
 
 @pytest.mark.long

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
+from ballpass.runtime.run.driver_angle import TURN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,15 +44,26 @@ class Limit:
         return 1.0 if self.upper else -1.0
 
 
-def read_limits(manifest: Manifest, option: str, texts: Sequence[str]) -> list[Limit]:
+def read_limits(
+    manifest: Manifest,
+    option: str,
+    texts: Sequence[str],
+    model: LoadedModel | None = None,
+    parameters: Mapping[str, float] | None = None,
+    varied: Sequence[str] = (),
+) -> list[Limit]:
     """Constraints from the texts of an option.
+
+    Parameters
+    ----------
+    model, parameters, varied : by which hours of a life are turns; without a model they are not converted
 
     Raises
     ------
     RequestError
-        Another form, an unknown quantity, or a wrong unit.
+        Another form, an unknown quantity, a wrong unit, or hours where the speed is not one number.
     """
-    return [_read(manifest, option, text) for text in texts]
+    return [_read(manifest, option, text, model, parameters or {}, varied) for text in texts]
 
 
 def limited(option: str, text: str) -> tuple[str, str, str]:
@@ -62,11 +75,39 @@ def limited(option: str, text: str) -> tuple[str, str, str]:
     return name, sign, written
 
 
-def _read(manifest: Manifest, option: str, text: str) -> Limit:
+def _read(
+    manifest: Manifest,
+    option: str,
+    text: str,
+    model: LoadedModel | None,
+    parameters: Mapping[str, float],
+    varied: Sequence[str],
+) -> Limit:
     name, sign, written = limited(option, text)
-    unit = parse_quantity_name(manifest, name).unit
+    quantity = parse_quantity_name(manifest, name)
+    unit, hours = quantity.unit, re.fullmatch(r"(\S+?)\s*h", written)
     try:
-        value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
+        if unit == "turns" and hours:
+            value = float(hours[1])
+            if model is not None:
+                value *= 3600.0 * _speed(model, option, quantity.channel, parameters, varied) / TURN
+        else:
+            value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
     except (QuantityError, ValueError) as error:
         raise RequestError(f"{option} {name}: {error}") from None
     return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)
+
+
+def _speed(
+    model: LoadedModel, option: str, channel: str, parameters: Mapping[str, float], varied: Sequence[str]
+) -> float:
+    """Mean speed of the inner ring against the outer one, where it is one number [rad/s]."""
+    manifest, values = model.manifest, model.numbers(parameters).values
+    ring = next(one for one in manifest.bearings if one.prefix + "ball.force" == channel).ring_speed
+    others = (model.numbers({**parameters, one: values[one] * 1.01 + 1e-9}).values[ring] for one in varied)
+    if (manifest.mechanism is not None and manifest.mechanism.angle) or any(one != values[ring] for one in others):
+        raise RequestError(
+            f"{option}: hours are turns by the speed, which is not one number here. Give turns, as in "
+            '"life >= 1e9 turns".'
+        )
+    return abs(float(values[ring]))

@@ -304,7 +304,8 @@ def optimize(
         raise RequestError(
             f"tolerance: {len(box)} were given. Allowed: {MOST_TOLERANCES}. Leave out those that matter least (sobol)."
         )
-    limits = read_limits(model.manifest, "subject_to", _texts(subject_to))
+    varied = [one.name for one in (*ranges, *box)]
+    limits = read_limits(model.manifest, "subject_to", _texts(subject_to), model, parameters, varied)
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
     shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
     minimized = minimize_by_ipopt if search == "ipopt" else minimize_by_planes

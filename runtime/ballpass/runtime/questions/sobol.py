@@ -281,7 +281,8 @@ def sobol(
     from ballpass.runtime.quantity.grammar import quantities_of
 
     inputs = read_inputs(model.manifest, "vary", vary)
-    limits = read_limits(model.manifest, "limit", [limit] if isinstance(limit, str) else list(limit or []))
+    texts = [limit] if isinstance(limit, str) else list(limit or [])
+    limits = read_limits(model.manifest, "limit", texts, model, parameters, tuple(inputs))
     names = [of] if isinstance(of, str) else list(of or [])
     names = list(dict.fromkeys([*names, *(one.quantity for one in limits)]))
     units = [one.unit for one in quantities_of(model, names)]
