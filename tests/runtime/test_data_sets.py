@@ -24,7 +24,7 @@ from ballpass.runtime import (
     Signals,
     make_data_set,
 )
-from ballpass.runtime.many import data_set
+from ballpass.runtime.many import data_set, data_set_store
 from ballpass.runtime.many.cluster import connected
 from ballpass.runtime.many.distributions import draw
 from ballpass.runtime.many.spall_entries import entry_times
@@ -315,6 +315,46 @@ def test_entry_times_of_a_spall_are_those_of_the_cage(
         assert np.all(beside < 1e-9)
         assert len(entries) in (int(0.1 * 8 * abs(cage) / (2 * np.pi)) + k for k in (0, 1))
         assert np.all((entries >= 0.01) & (entries < 0.11))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("name", ["set", "set.nc"])
+def test_entry_times_that_the_motion_decides_are_those_of_the_cage(
+    make_model: Callable[..., Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sense: int, name: str
+) -> None:
+    """A run-up beside a constant speed; more entries than there was room for, and a file of them that is deleted."""
+    spall = 'on = "outer"\nangle = "270 deg"\nchord = "2 mm"\nprofile = "half-sine"\ndepth = "5 um"'
+    pit, here = ("[bearing.initial]", f"[bearing.defects.pit]\n{spall}\n\n[bearing.initial]"), 'start_angle = "0 deg"'
+    rows = f'time = ["0 s", "0.4 s"]\nspeed = ["{sense * 300} rpm", "{sense * 900} rpm"]'
+    table = (here, f"{here}\n[mechanism.driver.table]\n{rows}\n#")
+    kept = ('"outer.*",', '"outer.*", "cage.in_outer",')
+    even = make_model("punching_press", pit, kept, ("500 rpm", f"{sense * 500} rpm"))
+    driven = make_model("punching_press", pit, kept, table, ('speed = "500 rpm"', ""))
+    shares = {"bearing.share": uniform(0.3, 0.6)}
+    some = [
+        SignalClass(label="even", model=even, members=2, parameters={}),
+        SignalClass(label="driven", model=driven, members=3, parameters=shares),
+    ]
+    outputs = {"outputs": ("cage.in_outer",), "precision": "float64"}
+    recorded = Signals(sample_rate=20e3, duration=0.4, transient=0.05, rtol=1e-7, **outputs)
+    monkeypatch.setattr(data_set_store, "ENTRIES", 4)
+    make_data_set(tmp_path / name, some, recorded, seed=1, chunk=2)
+    found = read(tmp_path / name)
+    times = found["entry_time.defects.pit"].values
+    assert times.shape[1] % 4 == 0
+    edge = driven.constants()[f"bearing.defects.pit.{'begin' if sense > 0 else 'end'}"]
+    for member in range(5):
+        entries = times[member][np.isfinite(times[member])]
+        seen = np.unwrap(found["cage.in_outer"].values[member])
+        turned = np.interp(entries, found.time.values, seen)
+        assert np.max(np.abs(np.angle(np.exp(1j * (8 * turned - edge))))) < 1e-5  # straight between samples
+        assert len(entries) in (int(8 * np.ptp(seen) / (2 * np.pi)) + k for k in (0, 1))
+        assert np.all(np.diff(entries) > 0.0)
+    if name == "set":
+        (tmp_path / name / "entry_time.defects.pit" / "1.0").unlink()
+        assert make_data_set(tmp_path / name, some, recorded, seed=1, chunk=2).made == 2
+        assert np.array_equal(read(tmp_path / name)["entry_time.defects.pit"], times, equal_nan=True)
 
 
 def test_entry_times_follow_a_slip_of_the_cage_that_changes(make_virtual: Callable[..., Model]) -> None:

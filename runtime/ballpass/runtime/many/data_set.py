@@ -23,7 +23,6 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked, refuse_full_disk
-from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure
@@ -48,7 +47,7 @@ from ballpass.runtime.many.data_set_store import (
 )
 from ballpass.runtime.many.distributions import Distribution, draw
 from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
-from ballpass.runtime.many.spall_entries import entry_times
+from ballpass.runtime.many.spall_entries import driven_spalls, entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import quantities_of, quantity_words
 from ballpass.runtime.run.request import check_memory
@@ -209,7 +208,7 @@ def make_data_set(
             made = _fill(place, classes, signals, seed, table, size, client, tell)
         failures = read_failures(group)
         if netcdf:
-            write_netcdf(group, target)
+            write_netcdf(open_store(store), target)
     if netcdf:
         shutil.rmtree(store)
     return DataSetReport(path=target, members=len(table.kinds), made=made, failures=failures)
@@ -259,18 +258,9 @@ def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _DataS
         drawn = draw(seed, kind, one.members, {**one.parameters, **noise})
         columns.append(drawn)
         defaults = {info.name: np.full(one.members, info.default) for info in one.model.manifest.parameters}
-        for text in (*unusual(one.model.manifest, defaults | drawn), *_without_entries(one.model.manifest)):
+        for text in unusual(one.model.manifest, defaults | drawn):
             warnings.warn(f"class {one.label}: {text}", UnusualWarning, stacklevel=3)
     return _DataSetTable(kinds=kinds[order], places=places[order], columns=tuple(columns))
-
-
-def _without_entries(manifest: Manifest) -> Iterator[str]:
-    """Sentences about spalls that balls enter at times that are not known before the run."""
-    for spall in dict.fromkeys(edge.rpartition(".")[0] for edge in manifest.edges if "defects." in edge):
-        yield (
-            f"the motion decides when a ball enters {spall}: the data set has no entry_time of it. Model.passages "
-            "gives the times of one run."
-        )
 
 
 def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: int, title: str) -> dict[str, Any]:
@@ -340,6 +330,7 @@ def _axes(
             snr[table.kinds == kind] = columns[_SNR][table.places[table.kinds == kind]]
     model = classes[0].model
     wanted = quantities_of(model, signals.quantities) if signals.quantities else ()
+    driven = _driven(classes)
     return SignalAxes(
         spec=spec,
         times=signals.times,
@@ -350,9 +341,15 @@ def _axes(
         names=[(info.name, info.unit, info.description) for info in infos.values()],
         parameters=_truth(classes, table, list(infos)),
         snr=snr,
-        entries=_entries(classes, signals, table),
+        entries={name: v for name, v in _entries(classes, signals, table).items() if name not in driven},
+        driven=driven,
         chunk=chunk,
     )
+
+
+def _driven(classes: Sequence[SignalClass]) -> tuple[str, ...]:
+    """Spalls that balls enter, in one class at least, when the motion decides."""
+    return tuple(dict.fromkeys(name for one in classes for name in driven_spalls(one.model.manifest).values()))
 
 
 def _fill(
@@ -376,13 +373,13 @@ def _fill(
 
     def tasks(keys: Sequence[str]) -> Iterator[tuple[Any, ...]]:
         for first in firsts:
-            yield place, first, dict(enumerate(keys)), signals, seed, members(first)
+            yield place, first, dict(enumerate(keys)), signals, seed, members(first), driven
 
-    models = [one.model for one in classes]
+    models, driven = [one.model for one in classes], _driven(classes)
     results: Iterator[tuple[int, Made]]
     if client is None:
         here = dict(enumerate(models))
-        results = ((first, make_signals(here, signals, seed, members(first))) for first in firsts)
+        results = ((first, make_signals(here, signals, seed, members(first), driven)) for first in firsts)
     else:
         results = run_tasks(
             client, models, _make_chunk, tasks, "What was finished before is kept: a second call continues."
@@ -399,11 +396,17 @@ def _fill(
 
 
 def _make_chunk(
-    place: SignalPlace, first: int, keys: Mapping[int, str], signals: Signals, seed: int, members: Sequence[Member]
+    place: SignalPlace,
+    first: int,
+    keys: Mapping[int, str],
+    signals: Signals,
+    seed: int,
+    members: Sequence[Member],
+    driven: Sequence[str],
 ) -> tuple[int, Made]:
     """On a worker: the signals of a chunk, without the samples where the worker sees the store and has written them."""
     models = {kind: loaded(keys[kind]) for kind in {member.kind: None for member in members}}
-    made = make_signals(models, signals, seed, members)
+    made = make_signals(models, signals, seed, members, driven)
     if place.seen():
         write_samples(open_store(place.path), first, made)
         made = replace(made, samples={})

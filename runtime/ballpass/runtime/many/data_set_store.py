@@ -26,6 +26,9 @@ from ballpass.runtime.many.signals import Made
 #: Number of the layout of data sets.
 SCHEMA = 1
 
+#: Times of entry that an array has room for at first, and by which it grows.
+ENTRIES = 64
+
 #: Characters of a message that are kept.
 MESSAGE = 300
 
@@ -85,6 +88,7 @@ class SignalAxes:
     parameters : shape (members, parameters) [SI]
     snr : shape (members,) [dB]
     entries : by spall, times at which a ball reaches it, shape (members, entries), NaN behind the last [s]
+    driven : spalls of which the motion decides these times
     chunk : members of a chunk
     """
 
@@ -98,6 +102,7 @@ class SignalAxes:
     parameters: np.ndarray
     snr: np.ndarray
     entries: Mapping[str, np.ndarray]
+    driven: Sequence[str]
     chunk: int
 
 
@@ -153,6 +158,9 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
             compressors=None,  # noise does not get smaller
             attributes={"_ARRAY_DIMENSIONS": ["member", "time"], "units": unit, "long_name": meaning},
         )
+    for name in axes.driven:
+        unknown = np.full((count, ENTRIES), np.nan)
+        array(f"entry_time.{name}", f"member entry.{name}", unknown, _entry_words(name), "s", chunk=size)
     array("failure", "member", np.full(count, "", f"<U{MESSAGE}"), "why there is no signal", chunk=size)
     array("status", "member", np.full(count, UNFINISHED, np.int8), "whether there is a signal", chunk=size)
     group["status"].attrs.update({"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)})
@@ -175,8 +183,11 @@ def _known_arrays(axes: SignalAxes) -> Iterator[tuple[str, str, np.ndarray, str,
     yield "parameters", "member parameter", axes.parameters, "parameters of the run; NaN: its class has none such", ""
     yield "snr", "member", axes.snr, "ratio of signal to noise", "dB"
     for name, times in axes.entries.items():
-        meaning = f"times in the record at which a ball reaches {name}; NaN behind the last"
-        yield f"entry_time.{name}", f"member entry.{name}", times, meaning, "s"
+        yield f"entry_time.{name}", f"member entry.{name}", times, _entry_words(name), "s"
+
+
+def _entry_words(spall: str) -> str:
+    return f"times in the record at which a ball reaches {spall}; NaN behind the last"
 
 
 def mend(group: Any, axes: SignalAxes) -> None:
@@ -190,7 +201,8 @@ def mend(group: Any, axes: SignalAxes) -> None:
             group[name][:] = values
     folder = Path(group.store.root)
     quantities = ["quantities"] if axes.quantities else []
-    names = [*(name for name, _, _ in axes.outputs), *quantities, "noise_rms", "failure", "status"]
+    entries = [f"entry_time.{name}" for name in axes.driven]
+    names = [*(name for name, _, _ in axes.outputs), *quantities, *entries, "noise_rms", "failure", "status"]
     for number, first in enumerate(range(0, len(axes.labels), axes.chunk)):
         which = slice(first, first + axes.chunk)
         places = {name: folder / name / ".".join(map(str, (number, *[0] * (group[name].ndim - 1)))) for name in names}
@@ -217,6 +229,7 @@ def _is_whole(group: Any, axes: SignalAxes, which: slice, places: Mapping[str, P
             return False
     status = group["status"][which] if "status" in lengths else np.array([UNFINISHED])
     made = [*(name for name, _, _ in axes.outputs), *(["quantities"] if axes.quantities else [])]
+    made += [f"entry_time.{name}" for name in axes.driven]
     wanted = made if np.any(status == MADE) else []
     # what holds nothing but zeros or empty words has no file
     wanted += ["noise_rms"] if wanted and np.any(np.isfinite(axes.snr[which])) else []
@@ -237,6 +250,8 @@ def write_status(group: Any, first: int, made: Made) -> None:
     group["noise_rms"][which] = made.noise_rms
     if made.quantities.shape[1]:
         group["quantities"][which] = made.quantities
+    for name, times in made.entries.items():
+        _write_entries(group, f"entry_time.{name}", which, times)
     status = np.full(count, MADE, dtype=np.int8)
     if made.failures:
         words = np.full(count, "", dtype=f"<U{MESSAGE}")
@@ -245,6 +260,30 @@ def write_status(group: Any, first: int, made: Made) -> None:
             words[failure.member] = f"{failure.status} at {failure.time:.9g} s: {failure.message}"[:MESSAGE]
         group["failure"][which] = words
     group["status"][which] = status
+
+
+def _note_length(store: Path, name: str) -> None:
+    """Note how long an array has become where readers look first; Zarr would also read marks and locks."""
+    known = json.loads((store / ".zmetadata").read_text(encoding="utf-8"))
+    known["metadata"][f"{name}/.zarray"] = json.loads((store / name / ".zarray").read_text(encoding="utf-8"))
+    new = store / ".zmetadata.new"
+    new.write_text(json.dumps(known, indent=2), encoding="utf-8")
+    os.replace(new, store / ".zmetadata")
+
+
+def _write_entries(group: Any, name: str, which: slice, times: Sequence[np.ndarray]) -> None:
+    """Write times of entry, as many in the longest row as there are."""
+    zarr = need("zarr")
+    array = zarr.open_array(group.store, path=name, mode="r+", zarr_format=2)  # it may be longer than the group knows
+    missing = max(map(len, times)) - array.shape[1]
+    if missing > 0:
+        array.resize((array.shape[0], array.shape[1] + -(-missing // ENTRIES) * ENTRIES))
+        _note_length(Path(group.store.root), name)
+    rows = np.full((len(times), array.shape[1]), np.nan)
+    for row, own in zip(rows, times, strict=True):
+        row[: len(own)] = own
+    with zarr.config.set({"array.write_empty_chunks": True}):  # a file that is missing was deleted
+        zarr.open_array(group.store, path=name, mode="r+", zarr_format=2)[which] = rows
 
 
 def read_failures(stored: Any) -> tuple[MemberFailure, ...]:

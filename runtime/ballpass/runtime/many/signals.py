@@ -19,14 +19,16 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.distributions import NOISE, Distribution, stream
+from ballpass.runtime.many.spall_entries import driven_spalls, entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
+from ballpass.runtime.quantity.passages import entering_times
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.sensor import Sensor
 from ballpass.runtime.run.simulate import simulate
 
@@ -151,27 +153,37 @@ class Made:
     samples : by output, each of shape (members, samples); NaN for a member without results
     noise_rms : root mean square of the noise that was added, shape (members, outputs) [units of the outputs]
     quantities : shape (members, quantities); NaN for a member without results
+    entries : by spall, times of each member at which a ball reaches it, where the motion decides them [s]
     failures : members without results, by their place here
     """
 
     samples: Mapping[str, np.ndarray]
     noise_rms: np.ndarray
     quantities: np.ndarray
+    entries: Mapping[str, Sequence[np.ndarray]]
     failures: tuple[MemberFailure, ...]
 
 
-def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int, members: Sequence[Member]) -> Made:
+def make_signals(
+    models: Mapping[int, LoadedModel],
+    signals: Signals,
+    seed: int,
+    members: Sequence[Member],
+    driven: Sequence[str] = (),
+) -> Made:
     """Simulate some members; a failure is recorded, not raised.
 
     Parameters
     ----------
     models : by class
+    driven : spalls of which times of entry are wanted; the motion decides those of one class at least
     """
     shape = (len(members), signals.samples)
     samples = {name: np.full(shape, np.nan, signals.precision) for name in signals.outputs}
     noise_rms = np.zeros((len(members), len(signals.outputs)))
     quantities = np.full((len(members), len(signals.quantities)), np.nan)
     failures = []
+    entries = {name: [np.zeros(0)] * len(members) for name in driven}
     times = signals.run_times
     rate = signals.sample_rate * signals.every
     for row, member in enumerate(members):
@@ -181,7 +193,12 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
             check_assembly(model, numbers)
             found = simulate(model, numbers, Request(times=times, outputs=signals.outputs, rtol=signals.rtol)).outputs
             if signals.quantities:
-                quantities[row] = _quantities(model, numbers, signals)
+                run = _recorded(model, numbers, signals)
+                quantities[row] = QuantityRun(model, quantities_of(model, signals.quantities)).measure(run).values
+            if driven:
+                for name, reached in _entries(model, numbers, signals, member.parameters).items():
+                    if name in entries:
+                        entries[name][row] = reached
         except BallpassError as fault:
             status, time = (fault.status.name, fault.time) if isinstance(fault, IntegrationError) else ("REFUSED", 0.0)
             failures.append(MemberFailure(member=row, status=status, time=time, message=str(fault)))
@@ -195,17 +212,32 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
                 noise_rms[row, k] = np.std(signal) * 10.0 ** (-member.snr / 20.0)
                 signal = signal + noise_rms[row, k] * random.standard_normal(len(signal))
             samples[name][row] = signal
-    return Made(samples=samples, noise_rms=noise_rms, quantities=quantities, failures=tuple(failures))
+    return Made(samples=samples, noise_rms=noise_rms, quantities=quantities, entries=entries, failures=tuple(failures))
 
 
-def _quantities(model: LoadedModel, numbers: Numbers, signals: Signals) -> np.ndarray:
-    """Quantities of the recorded part of a run, which takes the steps of the one with samples."""
+def _entries(
+    model: LoadedModel, numbers: Numbers, signals: Signals, parameters: Mapping[str, float]
+) -> dict[str, np.ndarray]:
+    """Times in the record at which a ball reaches a spall, by spall [s]."""
+    end = signals.transient + signals.duration
+    own = {name: np.array([value]) for name, value in parameters.items()}
+    own = own or {info.name: np.array([info.default]) for info in model.manifest.parameters[:1]}
+    known = {name: times[0] for name, times in entry_times(model, own, signals.transient, end).items()}
+    found = {name: times[np.isfinite(times)] for name, times in known.items()}
+    spalls = driven_spalls(model.manifest)
+    if spalls:
+        found |= {spalls[edge]: times for edge, times in entering_times(_recorded(model, numbers, signals)).items()}
+    return found
+
+
+def _recorded(model: LoadedModel, numbers: Numbers, signals: Signals) -> Run:
+    """The recorded part of a run, which takes the steps of the one with samples."""
     turn = driver_angle.period(model.manifest, numbers.values)
     request = Request(rtol=signals.rtol, transient_cycles=signals.transient / turn)
     run = resolve(model, numbers, request, duration=float(signals.times[-1]))
     if not math.isfinite(turn):
         run = replace(run, start=signals.transient)
-    return QuantityRun(model, quantities_of(model, signals.quantities)).measure(run).values
+    return run
 
 
 def check_outputs(manifest: Manifest, signals: Signals, label: str, model: LoadedModel | None = None) -> None:

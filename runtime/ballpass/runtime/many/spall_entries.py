@@ -1,6 +1,6 @@
-"""When balls reach the edge of a spall: the openings of its window, which are known before a run.
+"""When balls reach the edge of a spall: the openings of its window, known before a run or decided by its motion.
 
-In: a model, parameters of members.  Out: times by spall.
+In: a model, parameters of members, or a manifest.  Out: times by spall; spalls whose times the motion decides.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ballpass.runtime.contract.manifest import InputInfo
+from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
@@ -22,6 +22,15 @@ def spalls_of(model: LoadedModel) -> tuple[str, ...]:
     """Names of the spalls of a model, as ``defects.spall``."""
     names = [item.name.removeprefix(_GATE) for item in model.manifest.inputs if item.kind == "gate"]
     return tuple(name for name in names if "defects." in name)
+
+
+def driven_spalls(manifest: Manifest) -> dict[str, str]:
+    """Spalls that balls enter when the motion decides, as ``defects.spall``, by what their edges begin with."""
+    edges = dict.fromkeys(edge.rpartition(".")[0] for edge in manifest.edges if "defects." in edge)
+    prefixes = {bearing.path: bearing.prefix for bearing in manifest.bearings}
+    return {
+        edge: f"{prefixes[path]}defects.{name}" for edge in edges for path, _, name in [edge.partition(".defects.")]
+    }
 
 
 def entry_times(

@@ -33,7 +33,7 @@ from ballpass.runtime.quantity.panels import (
     split,
     uniform_panels,
 )
-from ballpass.runtime.quantity.passages import Passages, find_passages
+from ballpass.runtime.quantity.passages import Passages, find_passages, no_passages
 from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
@@ -140,7 +140,7 @@ class NodeLayer:
             kept=kept,
             segments=segments,
             edges=make_edges(run, segments, None),
-            passages=Passages(times=np.zeros(0), edges=(), columns=np.zeros(0, dtype=int), near=0.0),
+            passages=no_passages(),
             panels=None,
             plan=no_nodes(),
             track=None,

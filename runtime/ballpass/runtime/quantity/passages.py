@@ -40,15 +40,22 @@ class Passages:
     Attributes
     ----------
     times : shape (passages,) [s]
+    forward : whether the angle grows then, shape (passages,)
     edges : parameter or constant that is the angle of each edge
     columns : place of each edge among all of the model
     near : times as near as this to one of them count as equal [s]
     """
 
     times: Array
+    forward: NDArray[np.bool_]
     edges: tuple[str, ...]
     columns: NDArray[np.int_]
     near: float
+
+
+def no_passages() -> Passages:
+    """Of no edge."""
+    return Passages(times=np.zeros(0), forward=np.zeros(0, bool), edges=(), columns=np.zeros(0, int), near=0.0)
 
 
 class EdgeDistances(ChannelValues):
@@ -85,12 +92,20 @@ def find_passages(run: Run, track: Track) -> Passages:
     found = [item for item in sorted(found) if np.min(np.abs(track.edges.times - item[0])) > apart]
     times = np.array([time for time, _ in found])
     columns = np.array([manifest.edges.index(edge) for _, edge in found], dtype=int)
+    rates = np.zeros(len(found))
     if found:
         # by Newton, from the sign changes at the nodes
         seen, rows = distances.along(_there(run, track, times), run.numbers), np.arange(len(found))
         left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
-        times = times + left / seen["rate"].value[rows, columns] - before
-    return Passages(times=times, edges=tuple(edge for _, edge in found), columns=columns, near=10.0 * before)
+        rates = seen["rate"].value[rows, columns]
+        times = times + left / rates - before
+    return Passages(
+        times=times,
+        forward=rates > 0.0,
+        edges=tuple(edge for _, edge in found),
+        columns=columns,
+        near=10.0 * before,
+    )
 
 
 def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dict[str, Array]:
@@ -112,16 +127,43 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
             for edge, times in driver_angle.edge_times(item, numbers.values, run.start, run.end):
                 parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
     if model.manifest.edges:
-        cuts, run = step_ends(run), replace(run, progress=None)
-        check_memory("Edges along a run of", len(GAUSS) * len(cuts), 16 * len(model.states), "Run fewer cycles.")
-        segments = segments_of(run)
-        edges = make_edges(run, segments, None)
-        panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
-        passed = find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges)))
+        passed = _passages_of(run)
         at = passed.times + BEFORE * min(run.turn, run.duration)
         for edge in dict.fromkeys(model.manifest.edges):
             parts[edge].append(at[[name == edge for name in passed.edges]])
     return {edge: np.unique(np.concatenate(times)) for edge, times in parts.items()}
+
+
+def entering_times(run: Run) -> dict[str, Array]:
+    """Times at which a ball enters a spall, by what edges of the spall begin with [s].
+
+    Of spalls whose edges are met when the motion decides.  A ball enters by either edge, as the rings turn.
+    """
+    passed = _passages_of(run)
+    at = passed.times + BEFORE * min(run.turn, run.duration)
+    spalls = dict.fromkeys(edge.rpartition(".")[0] for edge in run.model.manifest.edges if "defects." in edge)
+    ways = ((".begin", True), (".end", False))
+    return {
+        spall: np.array(
+            [
+                time
+                for time, edge, forward in zip(at.tolist(), passed.edges, passed.forward.tolist(), strict=True)
+                if (edge.removeprefix(spall), forward) in ways
+            ]
+        )
+        for spall in spalls
+    }
+
+
+def _passages_of(run: Run) -> Passages:
+    """Passages of all edges that the motion decides, of a run that is made for them."""
+    cuts, run = step_ends(run), replace(run, progress=None)
+    count = 16 * len(run.model.states)
+    check_memory("Edges along a run of", len(GAUSS) * len(cuts), count, "Run fewer cycles.")
+    segments = segments_of(run)
+    edges = make_edges(run, segments, None)
+    panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
+    return find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges)))
 
 
 def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:
