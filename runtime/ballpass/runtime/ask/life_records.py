@@ -145,7 +145,7 @@ class StateStrength(ShortRepr):
     Examples
     --------
     >>> (state,) = model.life(cycles=4, transient=2).states  # no duty cycle
-    >>> state.share, state.turns
+    >>> state.share, round(state.turns, 9)
     (1.0, 2.0)
     """
 
