@@ -136,7 +136,7 @@ def test_derivatives_of_states_are_those_of_differences_in_every_turn(
         nothing = 1e-3 * np.max(np.abs(found.solution.x), axis=0) / large
         best = math.inf
         # a weak parameter shows little of a small step, a strong one turns in a large one
-        for step in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
+        for step in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1):
             difference = extrapolated(states, step * large)
             off = np.abs(found.x[:, :, k] - difference) / np.maximum(np.max(np.abs(difference), axis=0), nothing)
             # at an edge that moves velocities have two derivatives: a few samples lie on one
