@@ -164,3 +164,15 @@ hysteresis = "1 s/m"
         found = model.quantities(f"integral:{name}", duration=END, transient=0, rtol=1e-7)[f"integral:{name}"]
         samples = float(np.trapezoid(run[name], run.t))
         assert found.value == pytest.approx(samples, rel=1e-6)
+
+
+def test_work_of_a_run_from_rest_is_its_energy_where_steps_take_turns(tmp_path: Path) -> None:
+    """A turn at a first speed of zero has no end: 425 turns had 256 panels, and the work was half as much again."""
+    window = 'window = { start = "237 deg", end = "267 deg" }\n'
+    outputs = '"drive_power", "applied_power", "total_energy"'
+    model = _model(tmp_path, (window, ""), outputs=outputs)
+    rows = dict(zip(NAMES, [0.0, 3.0, 3.1, 3.2, 0.0, 314.0, 314.0, 314.0], strict=True))
+    parameters, duration = {**rows, "mechanism.driver.flywheel.inertia": 0.0}, 10.0
+    work, end, begin = "integral:applied_power", "end:total_energy", "value:total_energy@0s"
+    found = model.quantities([work, end, begin], duration=duration, transient=0, parameters=parameters)
+    assert found[work].value == pytest.approx(found[end].value - found[begin].value, rel=1e-6)

@@ -37,7 +37,8 @@ from ballpass.runtime.quantity.passages import Passages, find_passages, no_passa
 from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
-from ballpass.runtime.run.locating import LOCATED
+from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.run.resolve import Run
 
@@ -159,10 +160,22 @@ class NodeLayer:
                 found.append(here)
                 continue
             kinks = (kept[:, 1] > 0.0) & sort.graded
-            steps = panels_of_steps(here.edges, kept[:, 0], kinks, run.turn)
+            steps = self._panels_of_steps(run, here, kinks)
             here = self._along(run, here, uniform_panels(here.edges, run.turn) if sort.still else steps)
             found += self._refined(run, here, kinks)
         return [self._with_extremes(run, one, row) for one in found]
+
+    def _panels_of_steps(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
+        mechanism = self.model.manifest.mechanism
+        angle = "" if mechanism is None else mechanism.angle
+
+        def turned(times: Array) -> Array:
+            distinct, back = np.unique(times, return_inverse=True)
+            states = stepper_for(self.model, run.kinks).read(layout.kept, distinct)
+            found = states[:, self.model.states.index(angle)][back].reshape(times.shape)
+            return np.asarray(found / driver_angle.TURN)
+
+        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.turn, turned if angle else None)
 
     def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
         """The run along the nodes of panels."""
@@ -180,8 +193,8 @@ class NodeLayer:
             passages = find_passages(run, layout.track)
             if passages.edges:
                 edges = with_passages(layout.edges, passages.times, np.zeros((len(passages.times), 0)))
-                panels = panels_of_steps(edges, layout.kept[:, 0], kinks, run.turn)
-                layout = self._along(run, replace(layout, edges=edges, passages=passages), panels)
+                layout = replace(layout, edges=edges, passages=passages)
+                layout = self._along(run, layout, self._panels_of_steps(run, layout, kinks))
         assert layout.panels is not None
         each = []
         for item in layout.items:

@@ -10,7 +10,7 @@ seven, and the size of the part of third degree at its nodes gives how many time
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from ballpass.runtime.quantity.nodes import Edges, NodePlan, ordered_plan
 
 Array = NDArray[np.float64]
+
+#: Turns until times [s], both of one shape.
+Turned = Callable[[Array], Array]
 
 #: Nodes of Gauss's rule in a panel, in fractions of it, and their weights, which add up to one.
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -110,7 +113,9 @@ def uniform_panels(edges: Edges, turn: float) -> Panels:
     return split(_spans(whole, np.zeros(len(whole)), np.ones(len(whole)), np.zeros((len(whole), 2))), counts)
 
 
-def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float) -> Panels:
+def panels_of_steps(
+    edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None
+) -> Panels:
     """Panels that are steps; parts of them where a step is longer than a panel of `uniform_panels`.
 
     A step is as long as its states allow, which may be turns where a table gives the speed and nothing else moves.
@@ -120,11 +125,17 @@ def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: f
     ends : of the steps, increasing, shape (steps,) [s]
     kinks : whether outputs have a kink there, shape (steps,)
     turn : time of a turn, infinite where nothing turns [s]
+    turned : turns of a driver whose speed changes, until times; None where it does not change
     """
     panels, lengths = panels_between(edges, ends, kinks), np.diff(edges.times)
     longest = min(turn, float(np.sum(lengths[edges.first :]))) / FEWEST
-    spans = np.diff(panels.at(np.array([0.0, 1.0]))[0])[:, 0] * lengths[panels.segment]
-    return split(panels, np.maximum(np.ceil(spans / longest * (1.0 - 1e-9)), 1).astype(int))
+    places = panels.at(np.array([0.0, 0.5, 1.0]))[0] * lengths[panels.segment][:, None]
+    parts = (places[:, 2] - places[:, 0]) / longest
+    if turned is not None:
+        times = edges.times[panels.segment][:, None] + places
+        # both halves: the driver may turn back within a step
+        parts = np.maximum(parts, FEWEST * np.sum(np.abs(np.diff(turned(times), axis=1)), axis=1))
+    return split(panels, np.maximum(np.ceil(parts * (1.0 - 1e-9)), 1).astype(int))
 
 
 def _spans(segment: NDArray[np.int_], low: Array, high: Array, kinked: Array) -> Panels:
