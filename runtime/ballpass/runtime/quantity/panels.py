@@ -113,9 +113,7 @@ def uniform_panels(edges: Edges, turn: float) -> Panels:
     return split(_spans(whole, np.zeros(len(whole)), np.ones(len(whole)), np.zeros((len(whole), 2))), counts)
 
 
-def panels_of_steps(
-    edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None
-) -> Panels:
+def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None) -> Panels:
     """Panels that are steps; parts of them where a step is longer than a panel of `uniform_panels`.
 
     A step is as long as its states allow, which may be turns where a table gives the speed and nothing else moves.
