@@ -215,6 +215,14 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
     assert square < found["rms:drive_torque"] ** 2
 
 
+def test_smooth_reactions_have_no_lines_far_above_the_shafts(make_model: Callable[..., Model]) -> None:
+    """Nodes lay as dense as the reaction needs: 1024 a turn, and the line at 1025 was a quarter of the first."""
+    model, punch = make_model("punching_press"), {"mechanism.forces.punch.force.y": 0.0}
+    names = [f"amplitude:reaction.A.x@{order}x" for order in (1, 1025)]
+    first, far = model.quantities(names, cycles=3, transient=1, parameters=punch).values()
+    assert far.value < 1e-6 * first.value
+
+
 @pytest.mark.long
 def test_the_shaft_of_a_bearing_that_swings_is_the_driver(make_model: Callable[..., Model]) -> None:
     """Its rings have no mean speed against each other: the amplitude was that at 0 Hz, about nothing."""

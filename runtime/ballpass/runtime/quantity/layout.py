@@ -29,17 +29,19 @@ from ballpass.runtime.quantity.panels import (
     interpolated,
     panels_of_steps,
     parts_needed,
+    parts_of_oscillation,
     plan_of,
     split,
     uniform_panels,
 )
 from ballpass.runtime.quantity.passages import Passages, find_passages, no_passages
-from ballpass.runtime.quantity.records import Kind, Quantity
+from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.loop import segments_of
+from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.resolve import Run
 
 Array = NDArray[np.float64]
@@ -200,7 +202,7 @@ class NodeLayer:
         for item in layout.items:
             panels = layout.panels
             if not self._is_found(item):
-                panels = split(panels, self._parts(layout, item))
+                panels = split(panels, self._parts(run, layout, item))
                 panels = cut_at(panels, layout.edges, self._kinks(run, layout, item))
             each.append((item, panels))
         found = []
@@ -234,7 +236,7 @@ class NodeLayer:
             each.append((item, cut_at(layout.panels, layout.edges, times)))
         return self._each_along(run, layout, each)
 
-    def _parts(self, layout: Layout, item: Quantity) -> NDArray[np.int_]:
+    def _parts(self, run: Run, layout: Layout, item: Quantity) -> NDArray[np.int_]:
         """Into how many parts each panel is to be split; none where there would be too many."""
         assert layout.track is not None
         assert layout.panels is not None
@@ -245,7 +247,23 @@ class NodeLayer:
         # places of a raceway are hat functions of the balls' angles, whose corners no panel ends at
         least = HATS if kind_of(item).beside else 1
         parts, most = np.maximum(parts_needed(each, self._rough), least), max(MOST, 2 * len(GAUSS) * len(layout.panels))
-        return parts if len(GAUSS) * np.sum(parts) <= most else np.ones_like(parts)
+        if len(GAUSS) * np.sum(parts) > most:
+            parts = np.ones_like(parts)
+        oscillation = kind_of(item).frequency
+        if oscillation is None:
+            return parts
+        view = View(
+            run=run,
+            nodes=layout.track.nodes,
+            signals=layout.signals,
+            marks={},
+            slopes=lambda _: np.zeros(0),
+            names=(),
+        )
+        faster = parts_of_oscillation(layout.panels, layout.edges, oscillation(view, item)[0])
+        nodes, columns = len(GAUSS) * int(np.sum(faster)), len(self.model.states) + signal.shape[1]
+        check_memory(f"{item.name}: {nodes} nodes of", nodes, columns, "Ask for a lower frequency.")
+        return np.maximum(parts, faster)
 
     def _kinks(self, run: Run, layout: Layout, item: Quantity) -> Array:
         """Times of kinks of an integrated channel, beside those on which steps end [s]."""

@@ -44,6 +44,9 @@ FEWEST = 256
 #: rms by the speed was 0.4 % off, where the value had nine digits.
 ROUGH = 1e-4
 
+#: Most that an oscillation turns in a panel where it multiplies a signal: Gauss's rule is good to 1e-7 then [rad].
+TURNING = 2.0
+
 #: Most parts of a panel in one pass.
 PARTS = 8
 
@@ -230,6 +233,17 @@ def parts_needed(signals: Sequence[Array], rough: float) -> NDArray[np.int_]:
             third = np.einsum("i,pic->pc", _THIRD, signal.reshape(-1, len(GAUSS), signal.shape[1]))
             most = np.maximum(most, np.max(np.abs(third), axis=1) / extent)
     return np.clip(np.ceil(np.cbrt(most / rough)), 1, PARTS).astype(np.int_)
+
+
+def parts_of_oscillation(panels: Panels, edges: Edges, frequency: float) -> NDArray[np.int_]:
+    """Into how many parts each panel is to be split where a signal is multiplied with an oscillation, shape (panels,).
+
+    Parameters
+    ----------
+    frequency : of the oscillation [Hz]
+    """
+    lengths = np.diff(panels.at(np.array([0.0, 1.0]))[0])[:, 0] * np.diff(edges.times)[panels.segment]
+    return np.maximum(np.ceil(lengths * (2.0 * np.pi * frequency / TURNING)), 1).astype(np.int_)
 
 
 def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:

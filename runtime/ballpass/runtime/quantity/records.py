@@ -82,6 +82,7 @@ class Kind:
     around : whether it needs nodes around its extreme as well
     at_moment : whether it needs one moment only, for any nodes
     steep : whether the third power of the channel is integrated, which needs finer nodes
+    frequency : fastest oscillation that the channel is multiplied with [Hz], and its derivative; None where it is not
     beside : further channels that it needs, after the bearing's prefix
     reduced : value from the reductions of runs, shape (runs,); None where they do not hold it
     needs : channels that are reduced for it, from its own; None for that one
@@ -103,6 +104,7 @@ class Kind:
     around: bool = False
     at_moment: bool = False
     steep: bool = False
+    frequency: Callable[[View, Quantity], tuple[float, Array]] | None = None
     beside: tuple[str, ...] = ()
     reduced: Callable[[ReducedRuns, Quantity], Array] | None = None
     needs: Callable[[str], tuple[str, ...]] | None = None

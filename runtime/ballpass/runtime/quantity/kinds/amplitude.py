@@ -33,6 +33,7 @@ KINDS = (
         words="amplitude at",
         place=FREQUENCY,
         check=check_frequency,
+        frequency=frequency,
         evaluate=_amplitude,
     ),
 )
