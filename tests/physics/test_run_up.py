@@ -176,3 +176,20 @@ def test_work_of_a_run_from_rest_is_its_energy_where_steps_take_turns(tmp_path: 
     work, end, begin = "integral:applied_power", "end:total_energy", "value:total_energy@0s"
     found = model.quantities([work, end, begin], duration=duration, transient=0, parameters=parameters)
     assert found[work].value == pytest.approx(found[end].value - found[begin].value, rel=1e-6)
+
+
+def test_work_of_the_punch_after_a_long_rest_is_its_force_times_the_travel_in_every_window(tmp_path: Path) -> None:
+    """Edges lay a share of the run before the load's, where turns at a first speed of zero have no end."""
+    model = _model(tmp_path, outputs='"driver.angle", "force.punch.power"')
+    rows = dict(zip(NAMES, [90.0, 91.0, 92.0, 93.0, 0.0, 314.0, 314.0, 314.0], strict=True))
+    work, angle_end = "integral:force.punch.power", "end:driver.angle"
+    found = model.quantities([work, angle_end], duration=92.0, transient=0, parameters=rows)
+
+    def height(angle: float) -> float:
+        return 6e-3 * math.sin(angle) - math.sqrt(0.1**2 - (6e-3 * math.cos(angle)) ** 2)
+
+    travel = height(math.radians(267.0)) - height(math.radians(237.0))
+    last = found[angle_end].value
+    begin, end = (math.floor((angle - math.radians(267.0)) / math.tau) for angle in (START_ANGLE, last))
+    assert (last - math.radians(237.0)) % math.tau > math.radians(30.0)  # it ends outside the window
+    assert found[work].value == pytest.approx(8964.8 * travel * (end - begin), rel=1e-6)

@@ -43,19 +43,24 @@ class Passages:
     forward : whether the angle grows then, shape (passages,)
     edges : parameter or constant that is the angle of each edge
     columns : place of each edge among all of the model
-    near : times as near as this to one of them count as equal [s]
+    before : how long before the edges [s]
     """
 
     times: Array
     forward: NDArray[np.bool_]
     edges: tuple[str, ...]
     columns: NDArray[np.int_]
-    near: float
+    before: float
+
+    @property
+    def near(self) -> float:
+        """Times as near as this to one of them count as equal [s]."""
+        return 10.0 * self.before
 
 
 def no_passages() -> Passages:
     """Of no edge."""
-    return Passages(times=np.zeros(0), forward=np.zeros(0, bool), edges=(), columns=np.zeros(0, int), near=0.0)
+    return Passages(times=np.zeros(0), forward=np.zeros(0, bool), edges=(), columns=np.zeros(0, int), before=0.0)
 
 
 class EdgeDistances(ChannelValues):
@@ -98,13 +103,15 @@ def find_passages(run: Run, track: Track) -> Passages:
         seen, rows = distances.along(_there(run, track, times), run.numbers), np.arange(len(found))
         left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
         rates = seen["rate"].value[rows, columns]
+        # of the fastest turn: one at the first speed of a run-up from rest has no end
+        before = BEFORE / max(BEFORE / before, float(np.max(np.abs(rates))) / driver_angle.TURN)
         times = times + left / rates - before
     return Passages(
         times=times,
         forward=rates > 0.0,
         edges=tuple(edge for _, edge in found),
         columns=columns,
-        near=10.0 * before,
+        before=before,
     )
 
 
@@ -128,7 +135,7 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
                 parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
     if model.manifest.edges:
         passed = _passages_of(run)
-        at = passed.times + BEFORE * min(run.turn, run.duration)
+        at = passed.times + passed.before
         for edge in dict.fromkeys(model.manifest.edges):
             parts[edge].append(at[[name == edge for name in passed.edges]])
     return {edge: np.unique(np.concatenate(times)) for edge, times in parts.items()}
@@ -140,7 +147,7 @@ def entering_times(run: Run) -> dict[str, Array]:
     Of spalls whose edges are met when the motion decides.  A ball enters by either edge, as the rings turn.
     """
     passed = _passages_of(run)
-    at = passed.times + BEFORE * min(run.turn, run.duration)
+    at = passed.times + passed.before
     spalls = dict.fromkeys(edge.rpartition(".")[0] for edge in run.model.manifest.edges if "defects." in edge)
     ways = ((".begin", True), (".end", False))
     return {
