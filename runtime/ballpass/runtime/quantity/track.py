@@ -40,6 +40,9 @@ Array = NDArray[np.float64]
 #: Nodes whose derivatives are held in memory at once.
 BLOCK = 4096
 
+#: Expressions of CasADi are not for several threads, and its calls let others run: they are made one at a time.
+_MAKING = threading.Lock()
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Track:
@@ -186,6 +189,7 @@ class ChannelValues:
         self._columns = [(info.name, info.size) for info in self._outputs]
         self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
         self._own = threading.local()  # a loop is not for several threads, and differences run in several
+        self._functions: dict[str, casadi.Function] = {}
         self._derivatives: dict[int, Loop] = {}
         self._parts: dict[tuple[str, ...], ChannelValues] = {}
 
@@ -222,9 +226,7 @@ class ChannelValues:
         """
         found: dict[str, Array] = {}
         if self._more:
-            if not hasattr(self._own, "more"):
-                self._own.more = Loop(self._function(self._more_rows), ("t", "x", "u"))
-            every = self._own.more(count, given)["g"]
+            every = self._own_loop("more", self._more_rows)(count, given)["g"]
             column = 0
             for name, size in self._columns[len(self._outputs) :]:
                 found[name] = every[:, column : column + size]
@@ -241,9 +243,7 @@ class ChannelValues:
 
         They follow from time and positions alone.
         """
-        if not hasattr(self._own, "rates"):
-            self._own.rates = Loop(self._function(self._rows_with_rates), ("t", "x", "u"))
-        every = self._own.rates(len(track.nodes), self._given(track, numbers))["g"]
+        every = self._own_loop("rates", self._rows_with_rates)(len(track.nodes), self._given(track, numbers))["g"]
         values, rates = np.split(every, 2, axis=1)
         return values, rates
 
@@ -268,6 +268,17 @@ class ChannelValues:
             found[name] = Signal(value=value[:, columns], slope=slope[:, columns])
             column += size
         return found
+
+    def _own_loop(self, name: str, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]]) -> Loop:
+        """A loop of this thread over a function that all threads share."""
+        loop = getattr(self._own, name, None)
+        if loop is None:
+            with _MAKING:
+                if name not in self._functions:
+                    self._functions[name] = self._function(rows)
+                loop = Loop(self._functions[name], ("t", "x", "u"))
+            setattr(self._own, name, loop)
+        return loop
 
     def _loop(self, directions: int) -> Loop:
         """The channels asked for and their derivatives along directions, made from the expression graph."""

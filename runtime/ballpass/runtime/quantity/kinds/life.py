@@ -50,7 +50,7 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     """
     _check(view.manifest, view.numbers.values, quantity)
     bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
-    ratings, moved_ratings = _ratings(view, bearing)
+    ratings = ratings_of(bearing, view.numbers.values)
     passes = _over_passes(view, prefix)
     powers, moved_powers = (
         replace(one, inner_stands=bearing.stands_inside(view.numbers.values))
@@ -60,8 +60,8 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     shortest = min(readings, key=lambda reading: found[reading])
     notes = (f"of {shortest}",) if len(readings) > 1 else ()
     value, slope = float(found[shortest]), np.zeros(view.directions)
-    if np.isfinite(value):
-        slope = np.imag(lives(moved_ratings, moved_powers)[shortest]) / IMAGINARY
+    if np.isfinite(value) and view.directions:
+        slope = np.imag(lives(_moved_ratings(view, bearing, ratings), moved_powers)[shortest]) / IMAGINARY
     return Estimate(value=value, slope=slope, notes=notes)
 
 
@@ -80,8 +80,8 @@ def _moved(dual: Dual) -> NDArray[np.complex128]:
     return np.asarray(value + 1j * IMAGINARY * np.moveaxis(slope, -1, 0), dtype=complex)
 
 
-def _ratings(view: View, bearing: BearingInfo) -> tuple[Ratings, Ratings]:
-    """Ratings, and Q_ci and Q_ce moved along the directions [N]."""
+def _moved_ratings(view: View, bearing: BearingInfo, ratings: Ratings) -> Ratings:
+    """Ratings with Q_ci and Q_ce moved along the directions [N]."""
     values = view.numbers.values
     names = [name for name in view.numbers.parameters if name.startswith(f"{bearing.path}.")]
     every = casadi.SX.sym("parameters", len(names))
@@ -90,9 +90,9 @@ def _ratings(view: View, bearing: BearingInfo) -> tuple[Ratings, Ratings]:
     slopes = casadi.Function("slopes", [every], [casadi.jacobian(each, every)])([values[name] for name in names])
     seeds = np.array([view.slopes(name) for name in names]).reshape(len(names), view.directions)
     inner, outer = np.asarray(slopes) @ seeds
-    found = ratings_of(bearing, values)
-    moved = replace(found, inner_ball=_moved((found.inner_ball, inner)), outer_ball=_moved((found.outer_ball, outer)))
-    return found, moved
+    return replace(
+        ratings, inner_ball=_moved((ratings.inner_ball, inner)), outer_ball=_moved((ratings.outer_ball, outer))
+    )
 
 
 def _over_passes(view: View, prefix: str) -> View:
