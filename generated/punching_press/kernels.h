@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RINGS = 5, BP_NR = 7, BP_NG = 10, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RINGS = 5, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
@@ -16,7 +16,7 @@ static const int bp_is_angle[4] = {0, 0, 0, 0};
 
 #define BP_EACH_BEARING(DO) DO(0)
 
-enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_FIRST_RELATIVE = 0, BP_0_SUMS = 2, BP_0_FIRST_SUM = 0, BP_0_SLOPES = 10, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 20, BP_0_TURNING = 3, BP_0_TURNING_BY = 1, BP_0_STANDING = 10, BP_0_STANDING_BY = 3, BP_0_DAMAGE = 9, BP_0_DAMAGE_BY = 10 };
+enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_FIRST_RELATIVE = 0, BP_0_SUMS = 2, BP_0_FIRST_SUM = 0, BP_0_SLOPES = 6, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 16, BP_0_TURNING = 3, BP_0_TURNING_BY = 1, BP_0_STANDING = 10, BP_0_STANDING_BY = 3, BP_0_DAMAGE = 9, BP_0_DAMAGE_BY = 10 };
 
 static const double bp_0_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
 
@@ -73,7 +73,7 @@ static inline void bp_0_forces_lanes(const double *restrict co, const double *re
     }
 }
 
-/* The same, and of their slopes. 54 operations a ball. */
+/* The same, and of their slopes. 34 operations a ball. */
 static inline void bp_0_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
 {
     const double s0 = 0.0;
@@ -88,73 +88,49 @@ static inline void bp_0_slopes_lanes(const double *restrict co, const double *re
 #pragma omp simd
     for (int lane = 0; lane < BP_0_BALLS; lane++) {
         double w2 = co[0 * BP_0_BALLS + lane];
-        double w3 = s1 * w2;
-        double w5 = si[0 * BP_0_BALLS + lane];
-        double w6 = s4 * w5;
-        w3 = w3 + w6;
-        w6 = (double)(s0 < w3);
-        w3 = w3 * s9;
-        w3 = (w6 != 0.0 ? w3 : 0.0);
-        double w10 = s13 * w2;
-        double w8 = s12 + w10;
-        double w11 = s16 * w5;
-        w8 = w8 + w11;
-        double w0 = (double)(s0 < w8);
-        double w12 = sqrt(w8);
-        w8 = w8 * w12;
-        w11 = s20 * w8;
-        w11 = (w0 != 0.0 ? w11 : 0.0);
-        w3 = w3 + w11;
-        w11 = w3 * w2;
-        rows[0 * BP_0_BALLS + lane] = w11;
-        w3 = w3 * w5;
-        rows[1 * BP_0_BALLS + lane] = w3;
-        w8 = s30 * w12;
-        w12 = w8 * w2;
-        double w13 = w12 * w2;
-        w13 = (w0 != 0.0 ? w13 : 0.0);
-        rows[2 * BP_0_BALLS + lane] = w13;
-        w12 = w12 * w5;
-        w12 = (w0 != 0.0 ? w12 : 0.0);
-        rows[3 * BP_0_BALLS + lane] = w12;
-        w12 = w8 * w5;
-        w13 = w12 * w2;
-        w13 = (w0 != 0.0 ? w13 : 0.0);
-        rows[4 * BP_0_BALLS + lane] = w13;
-        w12 = w12 * w5;
-        w12 = (w0 != 0.0 ? w12 : 0.0);
-        rows[5 * BP_0_BALLS + lane] = w12;
-        w12 = s9 * w2;
-        w13 = w12 * w2;
-        w13 = (w6 != 0.0 ? w13 : 0.0);
-        rows[6 * BP_0_BALLS + lane] = w13;
-        w12 = w12 * w5;
-        w12 = (w6 != 0.0 ? w12 : 0.0);
-        rows[7 * BP_0_BALLS + lane] = w12;
-        w12 = s9 * w5;
-        w13 = w12 * w2;
-        w13 = (w6 != 0.0 ? w13 : 0.0);
-        rows[8 * BP_0_BALLS + lane] = w13;
-        w12 = w12 * w5;
-        w12 = (w6 != 0.0 ? w12 : 0.0);
-        rows[9 * BP_0_BALLS + lane] = w12;
-        w10 = s16 * w2;
-        double w9 = s13 * w5;
-        w10 = w10 - w9;
-        w8 = w8 * w10;
-        w0 = (w0 != 0.0 ? w8 : 0.0);
-        double w4 = s4 * w2;
-        double w1 = s1 * w5;
-        w4 = w4 - w1;
-        double w7 = s9 * w4;
-        w6 = (w6 != 0.0 ? w7 : 0.0);
-        w0 = w0 + w6;
-        w2 = w0 * w2;
-        w2 = w2 - w3;
-        rows[10 * BP_0_BALLS + lane] = w2;
-        w0 = w0 * w5;
-        w0 = w0 + w11;
-        rows[11 * BP_0_BALLS + lane] = w0;
+        double w1 = s1 * w2;
+        double w4 = si[0 * BP_0_BALLS + lane];
+        double w3 = s4 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(s0 < w1);
+        w1 = w1 * s9;
+        w1 = (w3 != 0.0 ? w1 : 0.0);
+        double w7 = s13 * w2;
+        double w6 = s12 + w7;
+        w7 = s16 * w4;
+        w6 = w6 + w7;
+        double w0 = (double)(s0 < w6);
+        double w8 = sqrt(w6);
+        w6 = w6 * w8;
+        w7 = s20 * w6;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        w1 = w1 + w7;
+        w7 = w1 * w2;
+        rows[0 * BP_0_BALLS + lane] = w7;
+        w1 = w1 * w4;
+        rows[1 * BP_0_BALLS + lane] = w1;
+        w1 = s30 * w8;
+        w8 = w2 * w2;
+        w7 = w1 * w8;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[2 * BP_0_BALLS + lane] = w7;
+        w2 = w2 * w4;
+        w7 = w1 * w2;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[3 * BP_0_BALLS + lane] = w7;
+        w4 = w4 * w4;
+        w1 = w1 * w4;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        rows[4 * BP_0_BALLS + lane] = w0;
+        w8 = s9 * w8;
+        w8 = (w3 != 0.0 ? w8 : 0.0);
+        rows[5 * BP_0_BALLS + lane] = w8;
+        w2 = s9 * w2;
+        w2 = (w3 != 0.0 ? w2 : 0.0);
+        rows[6 * BP_0_BALLS + lane] = w2;
+        double w5 = s9 * w4;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        rows[7 * BP_0_BALLS + lane] = w3;
     }
 }
 
@@ -712,7 +688,7 @@ static inline void bp_acceleration(const double *restrict x, const double *restr
     a[3] = w0;
 }
 
-/* Derivatives of the accelerations by positions and velocities, row-major. 54 operations. */
+/* Derivatives of the accelerations by positions and velocities, row-major. 46 operations. */
 static inline void bp_acceleration_jacobian(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict A, double *restrict B)
 {
     (void)x;
@@ -721,7 +697,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     (void)u;
     (void)w;
     double w0 = c[17];
-    double w1 = G[6];
+    double w1 = G[4];
     double w2 = w0 * w1;
     double w3 = c[12];
     double w4 = w2 * w3;
@@ -729,134 +705,149 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     double w6 = w0 * w5;
     double w7 = w4 - w6;
     A[0] = w7;
-    w7 = G[2];
+    w7 = G[1];
     double w8 = w0 * w7;
-    double w9 = G[4];
+    double w9 = G[3];
     double w10 = w0 * w9;
     double w11 = w10 * w3;
-    w8 = w8 + w11;
-    w11 = -w8;
-    A[1] = w11;
+    w11 = w8 + w11;
+    double w12 = -w11;
+    A[1] = w12;
     w6 = w6 - w4;
     A[2] = w6;
-    A[3] = w8;
-    w8 = G[7];
-    w6 = w0 * w8;
-    w4 = w6 * w3;
-    w11 = G[1];
-    double w12 = w0 * w11;
-    double w13 = w4 - w12;
+    A[3] = w11;
+    w11 = G[5];
+    w6 = w0 * w11;
+    w12 = w6 * w3;
+    double w13 = w12 - w8;
     A[4] = w13;
-    w13 = G[3];
-    double w14 = w0 * w13;
-    double w15 = G[5];
-    w0 = w0 * w15;
-    double w16 = w0 * w3;
-    w14 = w14 + w16;
-    w16 = -w14;
-    A[5] = w16;
-    w12 = w12 - w4;
-    A[6] = w12;
-    A[7] = w14;
-    w14 = c[32];
-    w5 = w14 * w5;
-    w1 = w14 * w1;
-    w12 = w1 * w3;
-    w4 = w5 - w12;
-    A[8] = w4;
-    w7 = w14 * w7;
-    w9 = w14 * w9;
-    w4 = w9 * w3;
-    w7 = w7 + w4;
-    A[9] = w7;
-    w12 = w12 - w5;
-    w5 = p[31];
-    w5 = w14 * w5;
-    w12 = w12 - w5;
-    A[10] = w12;
-    w7 = -w7;
-    A[11] = w7;
-    w11 = w14 * w11;
-    w8 = w14 * w8;
-    w7 = w8 * w3;
-    w12 = w11 - w7;
+    w13 = G[2];
+    w0 = w0 * w13;
+    w0 = w0 + w4;
+    w4 = -w0;
+    A[5] = w4;
+    w8 = w8 - w12;
+    A[6] = w8;
+    A[7] = w0;
+    w0 = c[32];
+    w5 = w0 * w5;
+    w1 = w0 * w1;
+    w8 = w1 * w3;
+    w12 = w5 - w8;
+    A[8] = w12;
+    w7 = w0 * w7;
+    w9 = w0 * w9;
+    w12 = w9 * w3;
+    w12 = w7 + w12;
+    A[9] = w12;
+    w5 = w8 - w5;
+    w4 = p[31];
+    w4 = w0 * w4;
+    w5 = w5 - w4;
+    A[10] = w5;
+    w12 = -w12;
+    A[11] = w12;
+    w11 = w0 * w11;
+    w3 = w11 * w3;
+    w12 = w7 - w3;
     A[12] = w12;
-    w13 = w14 * w13;
-    w15 = w14 * w15;
-    w3 = w15 * w3;
-    w13 = w13 + w3;
+    w13 = w0 * w13;
+    w13 = w13 + w8;
     A[13] = w13;
-    w7 = w7 - w11;
-    A[14] = w7;
-    w5 = w5 + w13;
-    w5 = -w5;
-    A[15] = w5;
-    w5 = -w10;
-    B[0] = w5;
-    w5 = -w2;
-    B[1] = w5;
+    w3 = w3 - w7;
+    A[14] = w3;
+    w4 = w4 + w13;
+    w4 = -w4;
+    A[15] = w4;
+    w4 = -w10;
+    B[0] = w4;
+    w4 = -w2;
+    B[1] = w4;
     B[2] = w10;
     B[3] = w2;
-    w2 = -w0;
-    B[4] = w2;
-    w2 = -w6;
-    B[5] = w2;
-    B[6] = w0;
+    B[4] = w4;
+    w4 = -w6;
+    B[5] = w4;
+    B[6] = w2;
     B[7] = w6;
     B[8] = w9;
     B[9] = w1;
     w6 = p[32];
-    w14 = w14 * w6;
-    w9 = w14 + w9;
+    w0 = w0 * w6;
+    w9 = w0 + w9;
     w9 = -w9;
     B[10] = w9;
-    w1 = -w1;
-    B[11] = w1;
-    B[12] = w15;
-    B[13] = w8;
-    w15 = -w15;
-    B[14] = w15;
-    w14 = w14 + w8;
-    w14 = -w14;
-    B[15] = w14;
+    w9 = -w1;
+    B[11] = w9;
+    B[12] = w1;
+    B[13] = w11;
+    B[14] = w9;
+    w0 = w0 + w11;
+    w0 = -w0;
+    B[15] = w0;
 }
 
-/* Partial time derivative of the accelerations at fixed state. 16 operations. */
+/* Partial time derivative of the accelerations at fixed state. 32 operations. */
 static inline void bp_acceleration_rate(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, const double *restrict wt, double *restrict at)
 {
     (void)x;
-    (void)S;
     (void)u;
     (void)p;
     (void)w;
     double w0 = c[17];
     double w1 = wt[2];
     double w2 = r[5];
-    double w3 = G[8];
-    double w4 = w2 * w3;
-    double w5 = wt[1];
-    w4 = w4 * w5;
-    double w6 = r[6];
-    w3 = w6 * w3;
-    double w7 = wt[0];
-    w3 = w3 * w7;
-    w4 = w4 - w3;
-    w1 = w1 - w4;
+    double w3 = r[2];
+    double w4 = G[0];
+    w4 = w3 * w4;
+    double w5 = r[1];
+    double w6 = G[1];
+    double w7 = w5 * w6;
+    w4 = w4 - w7;
+    w7 = r[3];
+    double w8 = G[4];
+    double w9 = w7 * w8;
+    w4 = w4 - w9;
+    w9 = r[4];
+    double w10 = G[3];
+    w10 = w9 * w10;
+    w4 = w4 + w10;
+    w10 = S[1];
+    w4 = w4 - w10;
+    w10 = w2 * w4;
+    double w11 = wt[1];
+    w10 = w10 * w11;
+    double w12 = r[6];
+    w4 = w12 * w4;
+    double w13 = wt[0];
+    w4 = w4 * w13;
+    w10 = w10 - w4;
+    w1 = w1 - w10;
     w1 = w0 * w1;
     at[0] = w1;
     w1 = wt[3];
-    w3 = G[9];
+    w3 = w3 * w6;
+    w6 = G[2];
+    w5 = w5 * w6;
+    w3 = w3 - w5;
+    w5 = G[5];
+    w7 = w7 * w5;
+    w3 = w3 - w7;
+    w9 = w9 * w8;
+    w3 = w3 + w9;
+    w9 = S[0];
+    w3 = w3 + w9;
     w2 = w2 * w3;
-    w2 = w2 * w5;
-    w6 = w6 * w3;
-    w6 = w6 * w7;
-    w2 = w2 - w6;
+    w2 = w2 * w11;
+    w12 = w12 * w3;
+    w12 = w12 * w13;
+    w2 = w2 - w12;
     w1 = w1 - w2;
     w0 = w0 * w1;
     at[1] = w0;
     w0 = c[32];
-    w4 = w0 * w4;
-    at[2] = w4;
+    w10 = w0 * w10;
+    at[2] = w10;
     w0 = w0 * w2;
     at[3] = w0;
 }

@@ -19,9 +19,10 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
-from ballpass.derive.lowering.ball_kernels import CONTACT, RINGS, BallKernels
+from ballpass.derive.lowering.ball_kernels import CONTACT, BallKernels
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.lowering.kernels import Kernel, Kernels
+from ballpass.derive.lowering.ring_motion_slopes import RINGS
 from ballpass.derive.system import System
 from ballpass.derive.variables import DRIVER_ANGLE
 from ballpass.runtime.ratings.elements import RATED

@@ -14,8 +14,9 @@ only:
 
 numbers   (p, c, w) -> k
 forces    -> S            F co, F si; F e' where effects turn bodies (own_terms)
-slopes    -> S, G         and the slopes of S: by the moving entries of r, one after the other, then by the ball's
-                          angle; where time alone moves what effects take, by time
+slopes    -> S, G         and the slopes of S: Fd cc, Fd cs, Fd ss, Fv cc, Fv cs, Fv ss; with effects the rows that
+                          time alone moves; or, where rings do not turn evenly or deflections are no such sum, all
+                          derivatives one by one
 partials  -> S, G, ...    and the derivatives of S by the ball's angle, by r0 and by k
 moved     (..., along directions of co, si, r, k) -> derivative of G
 sums_moved  (sums of the rows of partials, along directions of r, angle, k) -> derivative of S
@@ -33,11 +34,8 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.lowering.ring_motion_slopes import RELATIVE, RINGS, relative_motion, ring_motion_slopes
 from ballpass.derive.lowering.visitor import Visitor
-
-#: Coefficients of deflection and rate; behind them, cosine and sine of the cage's angle.
-RINGS = 5
-RELATIVE = RINGS + 2
 
 #: Rows of `contact`.
 CONTACT = ("force", "elastic_force", "damping_force", "deflection")
@@ -105,20 +103,18 @@ class BallBuilder:
         # what all balls have alike may be named among the definitions of one
         self._named = of_state.child({}, self._definitions)
         affine = self._affine()
-        #: whether deflections are no such sum of the ball's direction, or take what the state moves
+        #: whether slopes are taken one by one
         self.general = affine is None or (own is not None and own.slope is not None)
-        #: whether time alone moves what effects take
-        self._timed = own is not None and not self.general
         leaves = {symbol: ca.SX.sym(symbol.name) for symbol in states}
         self._of_ball = of_all(self._hoist, leaves) if self.general else of_state
         cage = [sp.cos(bearing.ball.cage_angle), sp.sin(bearing.ball.cage_angle)]
         rings = ca.vertcat(*map(of_state, affine or [sp.S.Zero] * RINGS), *map(of_state, cage))
         co, si, r = self.co, self.si, self.r
-        self._rows = self._ball(None if affine is None else _ring_motion(r, co, si), co, si)
+        self._rows = self._ball(None if affine is None else relative_motion(r, co, si), co, si)
         # opposite balls share their direction, and the products with it
         opposite = bearing.ball.count % 2 == 0 and not self.general
-        self._opposite = self._ball(_ring_motion(r, -co, -si), -co, -si) if opposite else None
-        motion = self._rows["motion"]
+        self._opposite = self._ball(relative_motion(r, -co, -si), -co, -si) if opposite else None
+        motion = self._motion(self._rows)
         self._further |= {s: leaf for s, leaf in leaves.items() if self.general and ca.depends_on(motion, leaf)}
         self.relative = ca.vertcat(rings, *(self._named(e) for e in self._further))
         entries = [None, *ca.vertsplit(r[1:]), *[None] * (RELATIVE - RINGS), *self._further.values()]
@@ -129,7 +125,11 @@ class BallBuilder:
             else None
             for entry, e in zip(entries, ca.vertsplit(self.relative), strict=True)
         ]
-        self._columns = sum(entry is not None for entry in self._moving)
+
+    @staticmethod
+    def _motion(at: dict[str, ca.SX]) -> ca.SX:
+        """Deflection, its rate, and the weights of the force."""
+        return ca.vertcat(at["delta"], at["rate"], at["weights"])
 
     def _hoist(self, expression: sp.Expr) -> ca.SX:
         """Entry of r behind the cage's direction, for what depends on time or state but not on the ball."""
@@ -166,7 +166,7 @@ class BallBuilder:
         at = self._of_ball.child({ball.cos: co, ball.sin: si}, self._definitions)
         inner = (ball.deflection, ball.deflection_rate)
         delta, rate = rings or (at(self._definitions.get(s, sp.S.Zero)) for s in inner)
-        taken, by_rings = [nothing] * 3, (delta, rate)
+        taken = [nothing] * 3
         if rings is not None and ball.own is not None:
             # their expressions: where all balls are alike these are hoisted whole
             third = ball.own.slope if ball.own.acceleration is None else ball.own.acceleration
@@ -182,11 +182,10 @@ class BallBuilder:
         )
         by = [sp.diff(force, s) for s in inner]
         held_force = ball.switching.force
-        weights = ca.vertcat(*(at(self._definitions.get(w, w)) for w in ball.weights))
         return {
             "delta": delta,
-            "weights": weights,
-            "motion": ca.vertcat(*(by_rings if self._timed else (delta, rate)), weights),
+            "rate": rate,
+            "weights": ca.vertcat(*(at(self._definitions.get(w, w)) for w in ball.weights)),
             "own_rate": taken[1],
             "own_acceleration": taken[2],
             "F": law(ball.force),
@@ -202,50 +201,64 @@ class BallBuilder:
             "held_v": held(sp.diff(held_force, inner[1])),
         }
 
+    def _slopes(self, at: dict[str, ca.SX], co: ca.SX, si: ca.SX, by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Rows of G of a ball in a direction."""
+        if self.general:
+            return self._every_slope(at, by_delta, by_rate)
+        rows = ca.vertsplit(ring_motion_slopes().summands(co, si, by_delta, by_rate))
+        if self.bearing.ball.own is not None:
+            moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
+            rows += [moved * co, moved * si]
+        return rows
+
     @staticmethod
     def _sums(at: dict[str, ca.SX], force: str) -> list[ca.SX]:
         """Rows of S."""
         return [at[force] * weight for weight in ca.vertsplit(at["weights"])]
 
-    def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
-        """Rows of G, of the forces at hand or of those with held sides, whose slopes these are."""
+    def _every_slope(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Derivatives of the rows of S by the moving entries of r, one after the other, then by the ball's angle.
+
+        Forces are those at hand, or those with held sides, whose slopes these are.
+        """
         force = at["F"] if by_delta is at["Fd"] else at["held"]
-        motion, direction = at["motion"], ca.vertcat(self.co, self.si)
+        motion, direction = self._motion(at), ca.vertcat(self.co, self.si)
         changes = [ca.jacobian(motion, entry) for entry in self._moving if entry is not None]
         changes.append(ca.jtimes(motion, direction, ca.vertcat(-self.si, self.co)))
         rows = []
         for change in changes:
             moved = by_delta * change[0] + by_rate * change[1]
             rows += ca.vertsplit(moved * at["weights"] + force * change[2:])
-        if self._timed:
-            rows += ca.vertsplit(-(by_delta * at["own_rate"] + by_rate * at["own_acceleration"]) * at["weights"])
         return rows
 
     def by_relative(self, sums: ca.SX, totals: ca.SX, r: ca.SX) -> ca.SX:
         """d(S)/d(r) from the sums and the totals of the slopes' rows."""
+        if not self.general:
+            return ring_motion_slopes().by_relative(sums, totals, r)
         count = sums.numel()
-        rows = count * (self._columns + 1)
-        *columns, turn = ca.horzsplit(ca.reshape(totals[:rows], count, rows // count))
+        *columns, turn = ca.horzsplit(ca.reshape(totals, count, totals.numel() // count))
         moving = iter(columns)
         by_r = ca.horzcat(*(ca.SX(count, 1) if entry is None else next(moving) for entry in self._moving))
         by_r[:, RINGS], by_r[:, RINGS + 1] = -r[RINGS + 1] * turn, r[RINGS] * turn
         return by_r
 
     def by_time(self, totals: ca.SX) -> ca.SX:
-        """Time derivative of S at fixed state and r."""
-        count = len(self.bearing.ball.sums)
-        return totals[-count:] if self._timed else ca.SX(count, 1)
+        """Time derivative of S at fixed state and r: what effects take while rings turn evenly."""
+        evenly = self.bearing.ball.own is not None and not self.general
+        return totals[6:8] if evenly else ca.SX(len(self.bearing.ball.sums), 1)
 
     @property
     def slopes(self) -> int:
         """Entries of G."""
-        return len(self.bearing.ball.sums) * (self._columns + 1 + self._timed)
+        if self.general:
+            return len(self.bearing.ball.sums) * (sum(entry is not None for entry in self._moving) + 1)
+        return 6 if self.bearing.ball.own is None else 8
 
     def kernels(self, c: ca.SX, p: ca.SX, w: ca.SX) -> BallKernels:
         """The functions, once the vectors of constants and stage variables are complete."""
         co, si, at = self.co, self.si, self._rows
         sums = self._sums(at, "F")
-        slopes = self._slopes(at, at["Fd"], at["Fv"])
+        slopes = self._slopes(at, co, si, at["Fd"], at["Fv"])
         # the kernels of balls that stand in no effect's way take the rings' motion alone
         turned = [ca.SX.sym("turned", RELATIVE - RINGS)] if self.general else []
         takes = {"co": co, "si": si, "r": ca.vertcat(self.r, *turned, *self._further.values())}
@@ -267,7 +280,7 @@ class BallBuilder:
             held = self._sums(at, "held")
             own["switches"] = made("switches", [at["g"], at["g_rate"]])
             own["held_forces"] = made("held_forces", held, border)
-            behind = self._slopes(at, at["held_d"], at["held_v"])
+            behind = self._slopes(at, co, si, at["held_d"], at["held_v"])
             own["held_slopes"] = made("held_slopes", [*held, *behind], border)
         over_numbers = _over_numbers(own, len(takes))
         numbers = over_numbers["numbers"].size1_out(0)
@@ -286,7 +299,7 @@ class BallBuilder:
             # each ball's rows and then their sum, as single runs add them up: the same bits
             to = self._opposite
             both = [one + other for one, other in zip(sums, self._sums(to, "F"), strict=True)]
-            behind = self._slopes(to, to["Fd"], to["Fv"])
+            behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
             joint = [one + other for one, other in zip(slopes, behind, strict=True)]
             over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}
         return BallKernels(
@@ -314,11 +327,6 @@ class BallBuilder:
         moved = by_r + by_r0 * r_d[0] + angled * a_d + by_k @ k_d
         takes = {"T": total, "r_d": r_d, "a_d": a_d, "k_d": k_d}
         return ca.Function("sums_moved", [*takes.values()], [ca.densify(moved)], [*takes], ["S_d"])
-
-
-def _ring_motion(r: ca.SX, co: ca.SX, si: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Deflection of a ball and its rate at a direction, without what effects take."""
-    return r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si
 
 
 def _is_smooth_in(value: ca.SX, symbol: ca.SX) -> bool:
