@@ -45,8 +45,6 @@ class FailureLocation:
         """A sentence on the ball; empty without one."""
         if self.ball is None:
             return ""
-        if self.deflection < 0.0:
-            return "No ball touches there."
         angle = math.degrees(self.ball_angle)
         ball = f"ball {self.ball}" + (f" of {self.bearing}" if self.bearing else "")
         return f"Most deflected there: {ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."

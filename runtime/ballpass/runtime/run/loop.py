@@ -12,7 +12,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -276,12 +276,12 @@ class RunUnderWay:
         self._refuse_void()
 
     def _refuse_void(self) -> None:
-        """Refuse results in which a ball is flattened as none can be; which ball at the end is not the one."""
+        """Refuse results in which a ball is flattened as none can be."""
         run = self.run
         for sink in self.sinks:
             why = void_words(run.model.manifest, run.numbers.values, sink.row) if isinstance(sink, ReductionRow) else ""
             if why:
-                place = replace(locate_failure(run.model, run.numbers, self.time, self.state), ball=None)
+                place = locate_failure(run.model, run.numbers, self.time, self.state)
                 raise RunFailed(End.VOID, self.time, 0.0, self.state, place, why)
 
     def _count(self, outcome: Outcome) -> None:

@@ -113,8 +113,8 @@ def simulate(
         steady_reductions=counted,
     )
     if failure is not None:
-        found = failure.place if isinstance(failure, RunFailed) else None
-        place = found or locate_failure(model, numbers, failure.time, last)
+        state = failure.state if isinstance(failure, RunFailed) else last
+        place = locate_failure(model, numbers, failure.time, state)
         raise IntegrationError(
             failure.status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
         )
