@@ -9,15 +9,18 @@ Keys are declared at the records that they fill (`ballpass.derive.scene.keys`). 
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
+from ballpass.derive.mechanism.forces.angle_table import MOST_TURNS, AngleTable
 from ballpass.derive.reading.change_coupling import Coupling, recoupled
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import duty_faults, read_duty
@@ -28,7 +31,17 @@ from ballpass.derive.scene.bearing_records import Bearing, InitialState
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
-from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, RunSettings, Scene, UnbalanceLoad, quantities_of
+from ballpass.derive.scene.records import (
+    OUTPUTS,
+    HarmonicLoad,
+    Load,
+    Mechanism,
+    RunSettings,
+    Scene,
+    Shaft,
+    UnbalanceLoad,
+    quantities_of,
+)
 from ballpass.derive.scene.shipped import shipped_scenes
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
@@ -47,8 +60,9 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
-#: Turns of a run whose length is not given, and those before them that it drops: what is left is the steady machine.
-STEADY_CYCLES, DROPPED_CYCLES = 10.0, 50.0
+#: Turns of a run whose length is not given, or a few more where loads repeat after several, and those before them that
+#: it drops: what is left is the steady machine.
+STEADY_CYCLES, DROPPED_CYCLES = 10, 50.0
 
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
@@ -234,7 +248,8 @@ def _read(root: Table, name: str) -> Scene:
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
-        run, outputs = _read_run(root.table("run", required=False))
+        cycle = _turns_of_loads(mechanism, shaft, loads)
+        run, outputs = _read_run(root.table("run", required=False), cycle * math.ceil(STEADY_CYCLES / cycle))
         given = root.data.get("run")
         turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
         transient = "transient_cycles" in turns
@@ -259,15 +274,28 @@ def _states_start(root: Table) -> Iterator[bool]:
         yield isinstance(bearing, dict) and "initial" in bearing
 
 
-def _read_run(table: Table) -> tuple[RunSettings, tuple[str, ...]]:
-    """Length, samples and method of a run, and the names of its outputs; without a length the steady machine's."""
+def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Sequence[Load]) -> int:
+    """Turns after which all loads repeat: means over other numbers of turns count some of these more than others."""
+    laws = [force.law for force in mechanism.forces] if mechanism is not None else []
+    counts = [law.turns for law in laws if isinstance(law, AngleTable)]
+    if shaft is not None and shaft.speed.value != 0.0:
+        for law in (load.law for load in loads):
+            if isinstance(law, HarmonicLoad):
+                ratio = math.tau * law.frequency.value / abs(shaft.speed.value)
+                near = Fraction(ratio).limit_denominator(MOST_TURNS)
+                counts += [near.denominator] if math.isclose(near, ratio, rel_tol=1e-9) else []
+    return math.lcm(1, *counts)
+
+
+def _read_run(table: Table, steady: int) -> tuple[RunSettings, tuple[str, ...]]:
+    """Length, samples and method of a run, and the names of its outputs; without a length `steady` turns count."""
     if table.missing:  # not a fault
         table = Table(table.collector, table.path, {})
     with table:
         run = read_record(RunSettings, table)
         if run.cycles is None and run.duration is None:
             dropped = run.transient_cycles if "transient_cycles" in table.data else DROPPED_CYCLES
-            run = replace(run, cycles=dropped + STEADY_CYCLES, transient_cycles=dropped)
+            run = replace(run, cycles=dropped + steady, transient_cycles=dropped)
         if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:
             table.fault(
                 "transient_cycles",

@@ -5,6 +5,7 @@ In: a model, and the numbers and the length of a run.  Out: sentences.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
+from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.settle import look_beyond
@@ -45,7 +47,7 @@ def warnings_of_transient(
 
 
 def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bool) -> list[str]:
-    """Sentences about a run and what more turns change.
+    """Sentences about a run, what more turns change, and means over a part of the turns after which loads repeat.
 
     Parameters
     ----------
@@ -56,14 +58,15 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     SimulationError
         A run from another start failed.
     """
+    words = _part_of_cycle(run)
     if longer is not None and longer.first:
-        return [_start_words(model, longer)]
+        return [_start_words(model, longer), *words]
     if asked or longer is None or model.manifest.run.stated:
-        return []
+        return words
     found = still_changes(run)
     names = remembered(found)
     if not names:
-        return []
+        return words
     # what a reader wants first; channels that are all but nothing may change by more
     names.sort(key=lambda n: (not n.endswith("ball.force"), row_place(model.manifest, n) is None, -found.changes[n]))
     first = ", ".join(f"{name} by {100.0 * found.changes[name]:.2g} %" for name in names[:SHOWN])
@@ -72,7 +75,20 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
         f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
         f"{first}{more}. Give a run with a longer "
-        "transient (--cycles, --transient), or let it be found (ballpass run --turns settle)."
+        "transient (--cycles, --transient), or let it be found (ballpass run --turns settle).",
+        *words,
+    ]
+
+
+def _part_of_cycle(run: Run) -> list[str]:
+    """A warning about means of a run that ends within the turns after which all loads repeat."""
+    cycle = cycle_turns(run.numbers.values)
+    turns = (run.end - run.start) / run.turn
+    if cycle == 1 or math.isclose(turns, cycle * round(turns / cycle), rel_tol=1e-9):
+        return []
+    return [
+        f"means and rms are over {turns:g} turns, and the loads repeat after {cycle}: some of these turns count more "
+        f"often than others. Let {cycle}, or a multiple of that, be behind the transient (--cycles, --transient)."
     ]
 
 

@@ -220,7 +220,7 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
         near = abs(order - round(order))
         if near * MOST > APART:
             turns = max(turns, math.ceil(APART / near))
-    return turns
+    return driver_angle.whole_cycles(values, turns)
 
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:

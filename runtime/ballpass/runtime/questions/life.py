@@ -129,6 +129,7 @@ def _clearance(
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.readings import READINGS
+    from ballpass.runtime.run.driver_angle import whole_cycles
 
     name = f"{info.path}.clearance"
     present = model.numbers(overrides).values[name]
@@ -140,10 +141,10 @@ def _clearance(
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
-    transient = model.run_settings.transient_cycles
+    transient, turns = model.run_settings.transient_cycles, whole_cycles(model.numbers(overrides).values, TURNS)
     asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
-    found = model.simulate_many(table, list(asked.values()), cycles=transient + TURNS)
+    found = model.simulate_many(table, list(asked.values()), cycles=transient + turns)
     if found.interrupted:
         raise KeyboardInterrupt
     lives = {reading: found[observable] for reading, observable in asked.items()}
-    return figures.life_of_clearance(title, bearing, clearances, lives, present, group, TURNS)
+    return figures.life_of_clearance(title, bearing, clearances, lives, present, group, turns)

@@ -70,6 +70,12 @@ def cycle_turns(values: Values) -> int:
     return math.lcm(1, *(table_turns(values, label) for label in labels))
 
 
+def whole_cycles(values: Values, turns: int) -> int:
+    """At least so many turns: as many as all loads repeat after, or several times that."""
+    cycle = cycle_turns(values)
+    return cycle * math.ceil(turns / cycle)
+
+
 def set_moving(manifest: Manifest, values: Values) -> dict[str, float]:
     """The first speed of a table that starts at rest, replaced by its fastest: which bearings turn then shows."""
     for item in manifest.inputs:

@@ -77,8 +77,9 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
     given = request.cycles is not None or request.duration is not None
     doubles = not given and not timed and math.isfinite(turn)
+    turns = driver_angle.whole_cycles(numbers.values, LEAST)
     if doubles:
-        request = replace(request, cycles=transient + LEAST)
+        request = replace(request, cycles=transient + turns)
     going = start_reducing(resolve(model, numbers, request), _channels(model))
     start, end = going.run.start, going.run.end
     if not doubles:
@@ -87,7 +88,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         going.go_on(end)
         return _compared(going, before)
     going.go_on(end)
-    before, turns = _history(going), LEAST
+    before = _history(going)
     while True:
         turns *= 2
         going.go_on(start + turns * turn)

@@ -105,10 +105,10 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     """
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
-    if not (real(most) >= 2 * LEAST and int(most) == most):
-        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
+    turns = driver_angle.whole_cycles(numbers.values, LEAST)
+    if not (real(most) >= 2 * turns and int(most) == most):
+        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.")
     transient = asked_transient(model, request.transient_cycles)
-    turns = LEAST
     turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
@@ -181,7 +181,9 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
         going.go_on()
         few = going.take()
     whole = (few.start + few.duration - run.begin) / turn
-    turns = min(LEAST, int(STEPS * whole / max(few.steps, 1)))
+    cycle = driver_angle.cycle_turns(run.numbers.values)
+    turns = min(driver_angle.whole_cycles(run.numbers.values, LEAST), int(STEPS * whole / max(few.steps, 1)))
+    turns -= turns % cycle
     if turns < 2.0 * few.duration / turn:
         return None
     request = Request(
