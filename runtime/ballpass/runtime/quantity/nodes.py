@@ -101,7 +101,7 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     Raises
     ------
     RequestError
-        Several loads switch at one time, and each could move separately.
+        Several loads switch at one time, and a parameter moves one of them away from another.
     """
     times, near = segments.times, 1e-9 * min(run.turn, run.duration)
     first = int(np.argmin(np.abs(times - run.start)))
@@ -109,9 +109,9 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     if chain is not None:
         turning = turn_slope(run, chain)
         for k, time in enumerate(times[1:-1].tolist(), start=1):
-            moved = driver_angle.breakpoint_derivative(run.model.manifest.inputs, run.numbers.values, time)
-            if moved and abs(time - run.start) > near:
-                columns[k] = sum(slope * chain.derivative(name) for name, slope in moved)
+            moved = chain.breakpoint(time)
+            if moved is not None and abs(time - run.start) > near:
+                columns[k] = moved
             elif math.isfinite(run.turn):
                 columns[k] = time / run.turn * turning
         if run.turns is not None:

@@ -96,18 +96,26 @@ class Chain:
                 u[k, row] += slope * self.derivative(name)
         return u
 
-    def breakpoint(self, time: float) -> np.ndarray:
-        """Derivative of the time of the breakpoint there, shape (directions,); zero where no load switches [s/unit].
+    def breakpoint(self, time: float) -> np.ndarray | None:
+        """Derivative of the time of the breakpoint there, shape (directions,); None where no load switches [s/unit].
 
         Raises
         ------
         RequestError
-            Several loads switch at that time, and each could move separately.
+            Several loads switch at that time, and a parameter moves one of them away from another.
         """
-        shift = np.zeros(len(self.names))
-        for name, slope in driver_angle.breakpoint_derivative(self._inputs, self._values, time):
-            shift += slope * self.derivative(name)
-        return shift
+        edges = driver_angle.breakpoint_derivatives(self._inputs, self._values, time)
+        if not edges:
+            return None
+        shifts = np.array([sum(slope * self.derivative(name) for name, slope in edge) for edge in edges])
+        apart = np.ptp(shifts, axis=0) > 1e-9 * np.max(np.abs(shifts), axis=0)
+        if np.any(apart):
+            raise RequestError(
+                f"At t = {time:.9g} s several loads switch at once ({', '.join(edge[0][0] for edge in edges)}): the "
+                f"motion has no derivative along {self.names[int(np.argmax(apart))]}, which moves only some of them. "
+                "Move their edges apart, or differentiate by other parameters."
+            )
+        return np.asarray(shifts[0])
 
 
 class Directions:
@@ -201,7 +209,9 @@ class Directions:
             u[k, :, : len(inputs)] = self._blocked(inputs)
             moved[k] = first_moved + starts[k] * stretch
             if segments.restarts[k] and starts[k] > 0.0:
-                shift[k] = self._blocked(self.chain.breakpoint(float(starts[k]))[None, :])[:, 0]
+                switch = self.chain.breakpoint(float(starts[k]))
+                if switch is not None:
+                    shift[k] = self._blocked(switch[None, :])[:, 0]
         return Tangents(
             p=self._blocked(self.chain.p),
             c=self._blocked(self.chain.c),

@@ -263,15 +263,13 @@ def input_derivatives(
     return entries
 
 
-def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[str, float]]:
-    """Derivative of the time of the breakpoint at `t`: (name of parameter or constant, derivative [s/unit]).
+def breakpoint_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[list[tuple[str, float]]]:
+    """Derivatives of the time of the breakpoint at `t`: (name of parameter or constant, derivative [s/unit]).
 
-    Raises
-    ------
-    RequestError
-        Several loads switch at that time, and each could move separately.
+    One list for each edge that lies there: of loads that switch, or else of tables that bend.
     """
-    found: dict[tuple[tuple[str, float], ...], None] = {}
+    jumps: dict[tuple[tuple[str, float], ...], None] = {}
+    bends: dict[tuple[tuple[str, float], ...], None] = {}
     for item in inputs:
         if item.kind == "gate" and values[item.rate] != 0.0:
             rate = values[item.rate]
@@ -287,23 +285,19 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
                     continue
                 for name, edge in zip(names, (start, start + width), strict=True):
                     if _passes(angle, edge):
-                        found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate), *moved)] = None
+                        jumps[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate), *moved)] = None
         elif item.kind == "table" and item.rate:
             rate = values[item.rate]
             for name, edge in zip(item.times, _knots(item, values)[0].tolist(), strict=True):
                 if rate != 0.0 and _passes(values[item.offset] + rate * t, edge):
-                    found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
+                    bends[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
         elif item.kind in ("table", "table_rate") and not item.rate:
             times = _knots(item, values)[0]
             near = np.flatnonzero(np.abs(times - t) <= TIME_RESOLUTION * max(abs(t), float(np.max(np.abs(times)))))
+            found = bends if item.kind == "table" else jumps
             for k in near:
                 found[((item.times[int(k)], 1.0),)] = None
-    if len(found) > 1:
-        raise RequestError(
-            f"At t = {t:.9g} s several loads switch at once ({', '.join(entry[0][0] for entry in found)}): the motion "
-            "has no derivative along a parameter that moves only one of them. Move their edges apart."
-        )
-    return [pair for entry in found for pair in entry]
+    return [list(edge) for edge in jumps or bends]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
