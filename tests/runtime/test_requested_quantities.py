@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
+from ballpass.runtime.certify.certificate import Verdict
 
 POWERS = ("drive_power", "force.punch.power", "weight.power", "contact.power", "housing.power")
 
@@ -51,3 +53,37 @@ def test_derivatives_of_pressure_are_a_third_of_those_of_the_force(make_model: C
         assert pressure.dimensionless == pytest.approx(force.dimensionless / 3.0, rel=1e-8), name
     assert report[of[2], wrt[1]].dimensionless == pytest.approx(1.0, rel=1e-8)
     assert all(pair.check.verdict.value == "verified" for pair in report.pairs)
+
+
+def test_statistics_of_an_angle_that_jumps_are_those_of_the_sawtooth(make_model: Callable[..., Model]) -> None:
+    """Of a crank from turn 2 to 4.3, whose angle is in (-pi, pi]; and their derivatives, jumps and all."""
+    model = make_model("four_bar")
+    asked = [f"{kind}:body.crank.angle" for kind in ("mean", "rms", "max", "range")]
+    # three pieces of straight lines: to pi, a whole turn, and what is left
+    ends = [(0.0, math.pi), (-math.pi, math.pi), (-math.pi, 0.6 * math.pi)]
+    length = 2.3 * math.tau
+    mean = sum((b**2 - a**2) / 2.0 for a, b in ends) / length
+    rms = math.sqrt(sum((b**3 - a**3) / 3.0 for a, b in ends) / length)
+    found = model.sensitivity(
+        asked, ["mechanism.driver.start_angle", "mechanism.driver.speed"], 4.3, transient=2, check=False
+    )
+    values = [pair.value for pair in found.pairs[::2]]
+    assert values == pytest.approx([mean, rms, math.pi, math.tau], rel=1e-11)
+    by_angle, by_speed = ([pair.derivative for pair in found.pairs[k::2]] for k in (0, 1))
+    end = 0.6 * math.pi
+    assert by_angle == pytest.approx([end / length, end**2 / (2.0 * length * rms), 0.0, 0.0], rel=1e-10, abs=1e-12)
+    assert by_speed == pytest.approx(np.zeros(4), abs=1e-12)
+
+
+@pytest.mark.long
+def test_derivatives_of_means_of_an_angle_that_jumps_hold_where_the_motion_decides_it(
+    make_model: Callable[..., Model],
+) -> None:
+    model = make_model("punching_press_motor", ('outputs = ["inner.*"', 'outputs = ["body.*", "inner.*"'))
+    asked = [f"{kind}:body.crank.angle" for kind in ("mean", "rms", "kurtosis", "amplitude")]
+    asked[-1] += "@9Hz"
+    tight = model.quantities(asked, cycles=3.3, transient=1, rtol=1e-12)
+    for name, value in model.quantities(asked, cycles=3.3, transient=1, rtol=1e-9).items():
+        assert value.value == pytest.approx(tight[name].value, rel=1e-8)
+    found = model.sensitivity(asked, ["mechanism.driver.speed", "mechanism.driver.start_angle"], 3.3, transient=1)
+    assert found.verdicts[Verdict.VERIFIED] == len(found.pairs)

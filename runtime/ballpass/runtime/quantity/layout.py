@@ -34,7 +34,7 @@ from ballpass.runtime.quantity.panels import (
     split,
     uniform_panels,
 )
-from ballpass.runtime.quantity.passages import Passages, find_passages, no_passages
+from ballpass.runtime.quantity.passages import Passages, find_passages, find_wraps, is_wrapped, no_passages
 from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
@@ -70,6 +70,7 @@ class Layout:
     kept : steps of the run
     segments : of the driver
     edges, passages, panels, plan : where nodes lie; no panels where moments alone are asked for
+    wraps : times among the edges at which the channel of integrals, an angle, jumps by a turn [s]
     track, signals : states and channels along them
     extremes : by quantity and "max" or "min", the best first
     """
@@ -80,6 +81,7 @@ class Layout:
     segments: Segments
     edges: Edges
     passages: Passages
+    wraps: Array
     panels: Panels | None
     plan: NodePlan
     track: Track | None
@@ -96,11 +98,13 @@ class _Sort:
     moment : whether a moment is its only node
     still : whether it follows from time alone
     graded : whether panels get finer towards kinks; states are smooth where contacts begin
+    wrapped : channel that is integrated and jumps by a turn; "" for another
     """
 
     moment: bool
     still: bool
     graded: bool
+    wrapped: str
 
 
 class NodeLayer:
@@ -144,6 +148,7 @@ class NodeLayer:
             segments=segments,
             edges=make_edges(run, segments, None),
             passages=no_passages(),
+            wraps=np.zeros(0),
             panels=None,
             plan=no_nodes(),
             track=None,
@@ -154,7 +159,9 @@ class NodeLayer:
         for item in noded:
             moment, resolved = kind_of(item).at_moment, not self._is_found(item)
             graded = resolved and item.channel not in self.model.states
-            sorts[_Sort(moment=moment, still=self.is_still(item), graded=graded and not moment)].append(item)
+            wrapped = item.channel if is_wrapped(item.channel) and self._is_kinked(item) else ""
+            sort = _Sort(moment=moment, still=self.is_still(item), graded=graded and not moment, wrapped=wrapped)
+            sorts[sort].append(item)
         found: list[Layout] = []
         for sort, items in sorts.items():
             here = replace(first, items=tuple(items), still=sort.still)
@@ -162,12 +169,13 @@ class NodeLayer:
                 found.append(here)
                 continue
             kinks = (kept[:, 1] > 0.0) & sort.graded
-            steps = self._panels_of_steps(run, here, kinks)
-            here = self._along(run, here, uniform_panels(here.edges, run.turn) if sort.still else steps)
-            found += self._refined(run, here, kinks)
+            here = self._along(run, here, self._panels(run, here, kinks))
+            found += self._refined(run, self._with_wraps(run, here, kinks) if sort.wrapped else here, kinks)
         return [self._with_extremes(run, one, row) for one in found]
 
-    def _panels_of_steps(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
+    def _panels(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
+        if layout.still:
+            return uniform_panels(layout.edges, run.turn)
         mechanism = self.model.manifest.mechanism
         angle = "" if mechanism is None else mechanism.angle
 
@@ -187,6 +195,17 @@ class NodeLayer:
         signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
         return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
 
+    def _with_wraps(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Layout:
+        """The same with edges where the channel of all quantities, an angle, jumps by a turn."""
+        assert layout.track is not None
+        angle = self._channels.only(channels_of(layout.items))
+        times = find_wraps(run, layout.track, angle, still=layout.still)
+        if not len(times):
+            return layout
+        edges = with_passages(layout.edges, times, np.zeros((len(times), 0)))
+        layout = replace(layout, edges=edges, wraps=times)
+        return self._along(run, layout, self._panels(run, layout, kinks))
+
     def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
         """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
         assert layout.track is not None
@@ -196,7 +215,7 @@ class NodeLayer:
             if passages.edges:
                 edges = with_passages(layout.edges, passages.times, np.zeros((len(passages.times), 0)))
                 layout = replace(layout, edges=edges, passages=passages)
-                layout = self._along(run, layout, self._panels_of_steps(run, layout, kinks))
+                layout = self._along(run, layout, self._panels(run, layout, kinks))
         assert layout.panels is not None
         each = []
         for item in layout.items:

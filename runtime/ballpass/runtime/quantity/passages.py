@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 #: side.
 BEFORE = 1e-8
 
+#: Sines of angles that are zero but for rounding, and Newton's steps to where an angle jumps.
+ROUNDING, NEWTON = 1e-12, 3
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Passages:
@@ -184,10 +187,49 @@ def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sen
     return np.asarray(-found["distance"].slope[rows, passages.columns] / rate[:, None])
 
 
+def is_wrapped(channel: str) -> bool:
+    """Whether a channel is an angle in (-pi, pi], which jumps where a body makes whole turns."""
+    return channel.startswith("body.") and channel.endswith(".angle")
+
+
+def find_wraps(run: Run, track: Track, angle: ChannelValues, *, still: bool) -> Array:
+    """Times at which an angle jumps from pi to -pi or back, shape (wraps,) [s].
+
+    Parameters
+    ----------
+    angle : the channel
+    still : whether it follows from time alone
+    """
+    value = angle.along(track, run.numbers)[angle.channels[0]].value[:, 0]
+    # a body that stands at pi is on either side of it by rounding
+    across = np.where((np.cos(value) < 0.0) & (np.abs(np.sin(value)) > ROUNDING), np.sin(value), 0.0)
+    times = crossings(track.nodes.t, track.nodes.segment, across)
+    for _ in range(NEWTON if len(times) else 0):
+        value, rate = (found[:, 0] for found in angle.with_rates(_there(run, track, times, still=still), run.numbers))
+        times = times + np.angle(-np.exp(-1j * value)) / rate
+    edges = track.edges.times
+    return np.array([time for time in times.tolist() if np.min(np.abs(edges - time)) > APART * run.duration])
+
+
+def wrap_slopes(
+    run: Run, track: Track, times: Array, angle: ChannelValues, chain: Chain, sensitivity_rtol: float, *, still: bool
+) -> Array:
+    """Derivatives of the times of `find_wraps` along the directions, shape (wraps, directions) [s/unit]."""
+    seen = _there(run, track, times, chain, sensitivity_rtol, still=still)
+    _, rate = angle.with_rates(seen, run.numbers)
+    return np.asarray(-angle.along(seen, run.numbers, chain)[angle.channels[0]].slope[:, 0] / rate)
+
+
 def _there(
-    run: Run, track: Track, times: Array, chain: Chain | None = None, sensitivity_rtol: float | None = None
+    run: Run,
+    track: Track,
+    times: Array,
+    chain: Chain | None = None,
+    sensitivity_rtol: float | None = None,
+    *,
+    still: bool = False,
 ) -> Track:
     """The run at these fixed times."""
     held = np.searchsorted(track.segments.times, times) - 1
     nodes = fixed_nodes(times, held, held, 0 if chain is None else len(chain.names))
-    return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol)
+    return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol, still=still)

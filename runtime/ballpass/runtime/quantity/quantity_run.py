@@ -38,7 +38,7 @@ from ballpass.runtime.quantity.nodes import (
     with_points,
 )
 from ballpass.runtime.quantity.panels import GAUSS, ROUGH
-from ballpass.runtime.quantity.passages import passage_slopes
+from ballpass.runtime.quantity.passages import passage_slopes, wrap_slopes
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.run.directions import Chain
@@ -172,7 +172,7 @@ class QuantityRun:
         found, layouts = self._measure(run, self._moving, len(names))
         laid = []
         for layout in layouts:
-            edges = _moving_edges(run, layout, chain, sensitivity_rtol)
+            edges = self._moving_edges(run, layout, chain, sensitivity_rtol)
             laid += [_Differentiated(run, part, edges, chain) for part in _by_nodes(layout)]
         slopes: dict[str, Estimate] = {}
         for still in (False, True):
@@ -282,6 +282,20 @@ class QuantityRun:
             needed |= set(self.model.states)
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])
 
+    def _moving_edges(self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> Edges:
+        """Edges of a layout that move with the parameters."""
+        edges, track = make_edges(run, layout.segments, chain), layout.track
+        if len(layout.wraps):
+            assert track is not None
+            angle = self._channels.only(channels_of(layout.items))
+            slopes = wrap_slopes(run, track, layout.wraps, angle, chain, sensitivity_rtol, still=layout.still)
+            edges = with_passages(edges, layout.wraps, slopes)
+        if layout.passages.edges:
+            assert track is not None
+            slopes = passage_slopes(run, track, layout.passages, chain, sensitivity_rtol)
+            edges = with_passages(edges, layout.passages.times, slopes)
+        return edges
+
     def _at_rest(self, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
         at_rest = kind_of(quantity).at_rest
         assert at_rest is not None  # all others are evaluated along the run
@@ -308,16 +322,6 @@ class _Differentiated:
             best, *others = (_mark(one, plan) for one in some)
             nodes = tuple(_node(plan, point) for point in beside.get(key, ()))
             self.marks[key] = replace(best, competing=tuple(others), around=nodes)
-
-
-def _moving_edges(run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> Edges:
-    """Edges of a layout that move with the parameters."""
-    edges = make_edges(run, layout.segments, chain)
-    if not layout.passages.edges:
-        return edges
-    assert layout.track is not None
-    slopes = passage_slopes(run, layout.track, layout.passages, chain, sensitivity_rtol)
-    return with_passages(edges, layout.passages.times, slopes)
 
 
 def _by_nodes(layout: Layout) -> list[Layout]:

@@ -6,10 +6,12 @@ says so.  A peak of about the same derivative does not count, for example the sa
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
+from ballpass.runtime.quantity.passages import is_wrapped
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
@@ -18,6 +20,9 @@ SECOND = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / 180.0
 
 #: A change of a parameter by this share of its value, or of a radian, is a small one [1].
 NEAR = 1e-3
+
+#: An extreme of an angle in (-pi, pi] that is nearer to pi is where it jumps [rad].
+AT_JUMP = 1e-5
 
 #: Derivatives (p/Q) dQ/dp that differ by less are one: by this share of the larger one, and by themselves [1].
 ALIKE, FLOOR = 0.1, 1e-3
@@ -34,6 +39,9 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
         notes.append(f"balls {mark.ball + 1} and {mark.other + 1} change rank there")
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
+    if is_wrapped(quantity.channel) and abs(abs(mark.value) - math.pi) < AT_JUMP:
+        notes.append("the angle jumps there, from pi to -pi or back")
+        mark, slope = replace(mark, value=math.copysign(math.pi, mark.value), competing=()), np.zeros(view.directions)
     # the minimum over the most loaded balls is not an extreme of one ball
     ranked = kind == "min" and signal.value.shape[1] > 1 and quantity.ball is None
     kink = "" if ranked else _competing_peak(view, quantity, mark)
