@@ -90,9 +90,28 @@ def test_drive_work_of_a_run_that_ends_within_a_turn_is_that_of_whole_turns(
         for method in ("auto", "cvodes"):
             run = model.simulate(cycles=cycles, transient=transient, method=method)
             assert summarize(model, run)["drive_work"]["value"] == pytest.approx(whole, rel=1e-6)
+    # a run in seconds that ends with a whole turn, which a slower driver ends later
+    end = 6.0 * math.tau / model.parameters[speed]
+    report = model.sensitivity(["drive_work"], [speed], duration=end, transient=2, check=False)
+    assert report.quantities[0].notes == ()
+    assert abs(report["drive_work", speed].dimensionless) < 1e-9
     with pytest.raises(RequestError, match="drive_work: the time that counts holds no whole turn"):
         model.quantities(["drive_work"], cycles=1.5, transient=0.75)
     assert "drive_work" not in summarize(model, model.simulate(cycles=1.5, transient=0.75))
+
+
+@pytest.mark.long
+def test_drive_work_of_a_time_of_whole_turns_has_the_derivative_towards_higher_speeds(
+    make_model: Callable[..., Model],
+) -> None:
+    """Two-way the turns after the start differ, and a slower driver leaves out the last one: a jump, which is said."""
+    model, speed = make_model("punching_press_two_way"), "mechanism.driver.speed"
+    end = 4.0 * math.tau / model.parameters[speed]
+    report = model.sensitivity(["drive_work"], [speed, "bearing.clearance"], duration=end, transient=2)
+    cycles = model.sensitivity(["drive_work"], [speed], 4, transient=2)
+    assert cycles.verdicts[Verdict.VERIFIED] == 1
+    assert report["drive_work", speed].derivative == pytest.approx(cycles["drive_work", speed].derivative, rel=1e-5)
+    assert all("the value jumps there" in pair.check.reason for pair in report.pairs)
 
 
 @pytest.mark.long

@@ -21,6 +21,7 @@ from ballpass.runtime.certify.certificate import (
     AGREEMENT,
     FLOOR,
     UNCHECKED,
+    Verdict,
     better_known,
     by_differences,
     compare,
@@ -215,6 +216,8 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     agreement=query.agreement,
                     sides=second.sides(row, column),
                 )
+                if check.verdict is Verdict.NOT_CHECKED and estimate.kink and check.sides is None:
+                    check = replace(check, reason=estimate.kink)
             derivative, known, by_second = better_known(derivative, float(own[row, column]), check)
             pairs.append(
                 Sensitivity(
