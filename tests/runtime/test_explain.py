@@ -50,6 +50,7 @@ def test_an_engine_is_explained_over_the_two_turns_of_its_cycle_whichever_comes_
         assert math.degrees(one.angle) == pytest.approx(math.degrees(same.angle), abs=2.0)
         assert one.acceleration == pytest.approx(same.acceleration, rel=0.02)
     assert "Breakpoints of the first 2 turns" in str(other)
+    assert "28 from 0° to 710°: knot of gas 28 times" in " ".join(str(first).split())
 
 
 def test_a_knot_of_a_table_is_named_in_the_scenes_words() -> None:

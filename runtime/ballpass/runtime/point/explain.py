@@ -8,7 +8,8 @@ and moving each way (only the motion shows the damping of a law that damps the a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -37,6 +38,9 @@ INSTANTS = 360
 
 #: Fastest oscillations in a turn, above which damped vibrations decay within a small part of it.
 MANY_OSCILLATIONS = 5000.0
+
+#: Breakpoints that are named one by one; of more, the table of a load has most.
+MOST_NAMED = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +126,7 @@ class Explanation(ShortRepr, Reported):
     turns: int = 1
 
     def _report(self) -> Report:
-        where = "; ".join(f"{math.degrees(item.angle):.4g}° {item.cause}" for item in self.breakpoints) or "none"
+        where = _places(self.breakpoints) or "none"
         first = "turn" if self.turns == 1 else f"{self.turns} turns"
         laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "none"
         parts: list[Words | ReportTable] = [
@@ -213,6 +217,16 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         unusual=tuple(unusual(manifest, values)),
         limits=tuple(limits_of_model(manifest, values)),
     )
+
+
+def _places(breakpoints: Sequence[Breakpoint]) -> str:
+    """Where the breakpoints are; of many, how many each load has."""
+    degrees = [f"{math.degrees(item.angle):.4g}°" for item in breakpoints]
+    if len(breakpoints) <= MOST_NAMED:
+        return "; ".join(f"{at} {item.cause}" for at, item in zip(degrees, breakpoints, strict=True))
+    times = Counter(cause for item in breakpoints for cause in item.cause.split(", "))
+    loads = ", ".join(f"{cause} {count} times" for cause, count in times.items())
+    return f"{len(breakpoints)} from {degrees[0]} to {degrees[-1]}: {loads} (each: --json)"
 
 
 def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -> tuple[Breakpoint, ...]:

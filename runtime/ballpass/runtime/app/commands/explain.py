@@ -180,21 +180,23 @@ def _modelled(report: dict[str, Any]) -> ReportTable:
     """The parts of the model, and how much of the right-hand side each one is."""
     total = report["functions"].get("rhs", {}).get("operations", 0)
     several = sum(part["path"].endswith(".contact") for part in report["modelled"]) > 1
-    rows = []
+    rows, last = [], []
     for part in report["modelled"]:
         counts, rest = part["operations"], part["rest"]
-        name = (
-            part["name"]
-            if rest is None
-            else f"the rest: {part['name'].partition(' of ')[0]} and rings{' of all' if several else ''}"
-        )
         added = rest if counts is None else counts.get("rhs", 0)
         cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
-        rows.append((name, str(part["line"] or ""), part["what"], cell))
+        line = str(part["line"] or "")
+        if rest is None:
+            rows.append((part["name"], line, part["what"], cell))
+        elif several:
+            rows.append((part["name"], line, part["what"], ""))
+            last.append(("the rest", "", "contacts and rings of all bearings", cell))
+        else:
+            rows.append((f"the rest: {part['name']} and rings", line, part["what"], cell))
     return ReportTable(
         title="Modelled",
         heads=("part", "line", "what", "operations"),
-        rows=rows,
+        rows=[*rows, *last],
         right=("line", "operations"),
         wrapped=("what",),
         caption="Operations of one evaluation of the equations of motion (rhs), and their share.",
