@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from ballpass.runtime import Model, RequestError
+from ballpass.runtime import KinkWarning, Model, QuantityFunction, RequestError
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
@@ -194,6 +194,26 @@ def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]
     )
     # a slow load: amplitude = F/k_p up to (omega/omega_0)^2 ~ 1e-5 and the square of the damper's c omega/k = 6e-3
     assert report.pairs[0].dimensionless == pytest.approx(-1.0, abs=2e-4)
+
+
+@pytest.mark.long
+def test_an_amplitude_of_rounding_has_a_corner_and_no_derivative(make_model: Callable[..., Model]) -> None:
+    """Of a harmonic load that is off, beside a mean of 196 N: the line has the phase of rounding."""
+    load = """type = "harmonic"
+mean = ["196 N", "0 N"]
+amplitude = ["0 N", "0 N"]
+frequency = "31 Hz"
+phase = "25 deg" #"""
+    model = make_model("varying_compliance", ('type = "constant" ', load), ('force = ["196 N", "0 N"]', ""))
+    asked, by = ["amplitude:load.x@31Hz", "amplitude:load.y@31Hz"], ["load.amplitude.x", "load.amplitude.y"]
+    report = model.sensitivity(asked, by, 20, transient=10)
+    assert [pair.value for pair in report.pairs] == [0.0] * 4
+    assert [pair.derivative for pair in report.pairs] == [0.0] * 4
+    for quantity, name in zip(asked, by, strict=True):
+        assert "the slope is -1.0" in report[quantity, name].check.reason
+    function = QuantityFunction(model, asked, by, 20, transient=10)
+    with pytest.warns(KinkWarning, match="load.x@31Hz.*: it is zero and has a corner there"):
+        assert not function.jacobian(function.start).any()
 
 
 def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Model]) -> None:

@@ -8,6 +8,9 @@ from ballpass.runtime.quantity.kinds.means import zero
 from ballpass.runtime.quantity.location import FREQUENCY, check_frequency, frequency
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 
+#: A line that is smaller than this share of its channel is rounding [1].
+ROUNDING = 8.0 * np.finfo(float).eps
+
 
 def _amplitude(view: View, quantity: Quantity) -> Estimate:
     value, slope = view.channel(quantity)
@@ -21,7 +24,8 @@ def _amplitude(view: View, quantity: Quantity) -> Estimate:
     sum_, sum_slope = view.nodes.weight @ swing, view.nodes.weight @ swing_slope + swing @ view.nodes.weight_slope
     line, line_slope = 2.0 * sum_ / length, 2.0 * (sum_slope - sum_ * longer / length) / length
     size = abs(line)
-    if size == 0.0:
+    if size <= ROUNDING * float(np.max(np.abs(value))):
+        # which way the line grows from there is rounding too
         return zero(view, "zero", line_slope)
     return Estimate(value=size, slope=np.real(np.conj(line) * line_slope) / size)
 
