@@ -61,8 +61,8 @@ def test_6204_under_1000_newton(
 def test_deflection_follows_the_two_thirds_power_of_the_load(bearing_6204: Model) -> None:
     """Zero clearance: every load a multiple of the first; and d(delta)/dF = (2/3) delta/F by the implicit function."""
     parameters = {"bearing.clearance": 0.0, "bearing.ball_angle": 0.1}
-    at = [bearing_6204.static_equilibrium(parameters=parameters, load=(f, 0.0)) for f in (1e-3, 100.0, 8e5)]
-    for one, force in zip(at, (1e-3, 100.0, 8e5), strict=True):
+    at = [bearing_6204.static_equilibrium(parameters=parameters, load=(f, 0.0)) for f in (1e-3, 100.0, 3e5)]
+    for one, force in zip(at, (1e-3, 100.0, 3e5), strict=True):
         assert one.positions == pytest.approx(at[1].positions * (force / 100.0) ** (2 / 3), rel=1e-9, abs=0.0)
     own = bearing_6204.static_equilibrium(parameters={**parameters, "load.force.x": 300.0, "load.force.y": 0.0})
     slope = own.derivative("positions", "load.force.x")

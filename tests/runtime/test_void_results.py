@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from quick_cases import long_but
 from typer.testing import CliRunner
 
-from ballpass.runtime import Model, SimulationError
+from ballpass.runtime import IntegrationError, Model, SimulationError, UnusualWarning
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.status import Status
 
@@ -47,6 +48,8 @@ def test_commands_end_with_what_to_change(words: str, scene: Path) -> None:
     said = " ".join(done.stderr.split())
     assert "a ball is flattened by" in said
     assert "Reduce load, speed or clearance" in said
+    if deflected := re.search(r"flattened by ([\d.]+) mm.*Most deflected there: .*, by (\d+) um", said):
+        assert float(deflected[2]) == pytest.approx(1e3 * float(deflected[1]), abs=1.0)
 
 
 def test_lanes_find_the_members_that_are_void_alone(make_model: Callable[..., Model]) -> None:
@@ -71,3 +74,57 @@ def test_members_are_void_one_by_one(make_model: Callable[..., Model]) -> None:
     assert alone.failures[0].status == Status.VOID.name
     with pytest.raises(SimulationError, match="a ball is flattened by"):
         model.simulate(cycles=1, transient=0, parameters={FORCE: HEAVY})
+
+
+#: One turn, which the scene's twenty transient turns hold, or all of it counts; what else a run keeps.
+ROUTES: dict[str, Callable[[Model], Any]] = {
+    "within the transient": lambda model: model.simulate(1, parameters={FORCE: HEAVY}),
+    "without outputs": lambda model: model.simulate(1, parameters={FORCE: HEAVY}, outputs=[]),
+    "cvodes": lambda model: model.simulate(0.1, parameters={FORCE: HEAVY}, method="cvodes", rtol=1e-6),
+    "sensitivities": lambda model: model.sensitivities([FORCE], 0.1, parameters={FORCE: HEAVY}),
+    "static equilibrium": lambda model: model.static_equilibrium(parameters={FORCE: HEAVY}),
+    "linearize": lambda model: model.linearize(parameters={FORCE: HEAVY}),
+    "section": lambda model: model.section(readings=40, parameters={FORCE: HEAVY}),
+}
+
+
+@pytest.mark.parametrize("route", long_but(ROUTES, "within the transient", "without outputs"))
+def test_no_route_gives_void_results(route: str, make_model: Callable[..., Model]) -> None:
+    with pytest.raises(SimulationError, match="a ball is flattened by"):
+        ROUTES[route](make_model("varying_compliance"))
+
+
+@pytest.mark.parametrize("name", ["value:inner.x@0.1s", "amplitude:inner.x@cage"])
+def test_quantities_that_no_step_reduces_are_void_too(name: str, make_model: Callable[..., Model]) -> None:
+    found = make_model("varying_compliance").simulate_many({FORCE: [196.0, HEAVY]}, name, cycles=1, transient=0)
+    assert [(failure.member, failure.status) for failure in found.failures] == [(1, Status.VOID.name)]
+
+
+def test_the_failure_is_at_the_moment_of_the_largest_flattening(make_model: Callable[..., Model]) -> None:
+    """Which ball that is, and when, is the maximum of the run's own outputs at dense samples."""
+    model = make_model("varying_compliance")
+    with pytest.raises(IntegrationError) as caught:
+        model.simulate(1, parameters={FORCE: HEAVY}, transient=0)
+    failure = caught.value
+    with pytest.raises(IntegrationError) as again:
+        model.simulate(parameters={FORCE: HEAVY}, transient=0, times=np.linspace(0.0, 2.0 * failure.time, 1001)[1:])
+    found = again.value.partial
+    assert found.t[-1] == pytest.approx(failure.time, rel=3e-3)
+    assert failure.partial.t[-1] <= failure.time
+    deflections = found["ball.deflection"]
+    assert np.argmax(deflections.max(axis=1)) >= len(deflections) - 2
+    assert np.argmax(deflections[-1]) + 1 == failure.ball
+    assert f"by {1e6 * deflections.max():.4g} um" in str(failure)
+
+
+def test_a_void_start_of_a_run_that_counts_later_is_a_warning(make_model: Callable[..., Model]) -> None:
+    """A ring thrown at its balls with 20 m/s flattens them once; a turn later it has come to rest."""
+    model = make_model("varying_compliance")
+    start = np.array([0.0, 0.0, 20.0, 0.0])
+    given: dict[str, Any] = {"initial": start, "outputs": ["ball.deflection"]}
+    with pytest.warns(UnusualWarning, match=r"Before the turns that count, t = .* a ball is flattened by"):
+        found = model.simulate(20, transient=19, **given)
+    assert found.steady_reductions is not None
+    assert found.steady_reductions["ball.deflection"].maximum < 1e-4
+    with pytest.raises(IntegrationError, match="a ball is flattened by"):
+        model.simulate(1, transient=0, **given)

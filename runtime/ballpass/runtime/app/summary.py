@@ -29,6 +29,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.contract.version import __version__
+from ballpass.runtime.native.reduction_rows import DEFLECTION
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
@@ -36,9 +37,10 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.kinds.drive_work import whole_cycles
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
-from ballpass.runtime.ratings.result_limits import VOID, limit_words, passed_limit
+from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.driver_angle import TURN
+from ballpass.runtime.run.failure_location import ring_distances
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
 if TYPE_CHECKING:
@@ -124,28 +126,18 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
 
 
 def _unusual(sol: Solution) -> list[str]:
-    """Results outside what real bearings show.
-
-    Raises
-    ------
-    SimulationError
-        No bearing could be so: a ball is flattened by more than a tenth, or a ring displaced by more than a ball.
-    """
+    """Results outside what real bearings show; those that no bearing can have, a run refuses."""
     said = []
-    for bearing in sol.manifest.bearings:
-        ball = sol.parameters[f"{bearing.path}.ball_diameter"]
-        known = {**sol.parameters, **sol.constants}
-        outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
-        apart = np.hypot(*(sol[bearing.inner_state(axis)] - o for axis, o in zip("xy", outer, strict=True)))
-        displacement = float(np.max(apart))
-        deflection = contact_cosine(bearing, known) * (displacement - radial_gap(bearing, known))
-        limit = passed_limit(ball, deflection, displacement)
-        if limit is None:
-            continue
-        words = limit_words(bearing, limit, ball=ball, deflection=deflection, displaced=displacement)
-        if limit in VOID:
-            raise SimulationError(words)
-        said.append(words)
+    known = {**sol.parameters, **sol.constants}
+    reduced: Mapping[str, Reduction] = sol.reductions or {}
+    for bearing, apart in zip(sol.manifest.bearings, ring_distances(sol.manifest, sol.x.T), strict=True):
+        ball, name = sol.parameters[f"{bearing.path}.ball_diameter"], bearing.prefix + DEFLECTION
+        displaced = float(np.max(apart))
+        deflection = contact_cosine(bearing, known) * (displaced - radial_gap(bearing, known))
+        if name in reduced:  # of a ball, which need not be where the rings are nearest
+            deflection = reduced[name].maximum
+        if passed_limit(ball, deflection, displaced):
+            said.append(limit_words(bearing, "deflected", ball=ball, deflection=deflection, displaced=displaced))
     return said
 
 

@@ -9,6 +9,7 @@ its neighbourhood within a period.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
+from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import sensitivities
 from ballpass.runtime.run.simulate import simulate
@@ -217,10 +219,11 @@ class Shooting:
                     )
             tight = tight or small < NEAR
             for _ in range(HALVINGS):
-                then = self.residual(nodes + share * step, value, None if tight else rough)
                 runs += 1
-                if then.size < now.size or small < NEAR:
-                    break
+                with contextlib.suppress(IntegrationError):  # too long a step may end where no bearing can be
+                    then = self.residual(nodes + share * step, value, None if tight else rough)
+                    if then.size < now.size or small < NEAR:
+                        break
                 share /= 2.0
             else:
                 break

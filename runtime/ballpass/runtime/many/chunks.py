@@ -21,7 +21,7 @@ from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import is_void, void_words
+from ballpass.runtime.native.reduction_rows import is_void, void_moment
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.locating import Kinks
@@ -50,7 +50,7 @@ class MemberFailure:
     member : its place in the table
     status : a name of `ballpass.runtime.contract.status.Status`, ``REFUSED`` where its numbers cannot be simulated, or
         ``INTERRUPTED``
-    time : reached [s]
+    time : reached; of void results, when a ball is flattened most [s]
     message : cause and remedy
 
     Examples
@@ -253,10 +253,10 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
     if rows is not None:
         void = is_void(work.model.manifest, {name: all_[which] for name, all_ in work.members.columns.items()}, rows)
         for place in np.flatnonzero(void & (results["status"] == End.DONE)).tolist():
-            member, time = int(which[place]), float(results[place]["time"])
+            member = int(which[place])
             values = {name: float(all_[member]) for name, all_ in work.members.columns.items()}
-            why = void_words(work.model.manifest, values, rows[place])
-            note_failure(work, member, Status.VOID.name, why, time)
+            if found := void_moment(work.model.manifest, values, rows[place]):
+                note_failure(work, member, Status.VOID.name, *found)
     return counts
 
 

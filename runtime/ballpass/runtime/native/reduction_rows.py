@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
-from ballpass.runtime.ratings.result_limits import FLATTENED, VOID, limit_words, passed_limit
+from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ class ReductionRows:
     def empty(self, count: int, start: ArrayLike, channels: Collection[str]) -> np.ndarray:
         """Rows of reductions of these channels that count from `start` on [s], shape (count, size).
 
-        Where there are any, the deflection of the balls is among them: it shows whether a bearing can be so.
+        The deflection of the balls is always among them: it shows whether a bearing can be so.
         """
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")] = start
@@ -149,8 +149,8 @@ class ReductionRows:
         below = (n.removesuffix(power.name) + power.of for n in channels for power in POWERS if n.endswith(power.name))
         wanted = {*channels, *below}
         for name in self.channels:
-            guards = bool(channels) and name.endswith(DEFLECTION)
-            rows[:, self.column("wanted", name)] = 1.0 if name in wanted else GUARD if guards else 0.0
+            guard = GUARD if name.endswith(DEFLECTION) else 0.0
+            rows[:, self.column("wanted", name)] = 1.0 if name in wanted else guard
         return rows
 
 
@@ -166,15 +166,13 @@ def is_void(manifest: Manifest, values: Mapping[str, ArrayLike], rows: Array) ->
     return void
 
 
-def void_words(manifest: Manifest, values: Mapping[str, float], row: Array) -> str:
-    """Why a run means nothing; empty where it is not void."""
+def void_moment(manifest: Manifest, values: Mapping[str, float], row: Array) -> tuple[str, float] | None:
+    """Why a run means nothing, and when its largest deflection is [s]; None where it is not void."""
+    layout = reduction_rows(manifest)
     for bearing, (deflection,) in _deflections(manifest, row[None, :]):
-        ball, clearance = (values[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
-        displaced = deflection + clearance / 2.0
-        limit = passed_limit(ball, deflection, displaced)
-        if limit in VOID:
-            return limit_words(bearing, limit, ball=ball, deflection=deflection, displaced=displaced)
-    return ""
+        if words := void_words(bearing, values, deflection):
+            return words, float(row[layout.column("max_time", bearing.prefix + DEFLECTION)])
+    return None
 
 
 def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo, Array]]:

@@ -25,6 +25,7 @@ from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, TIME, JacobianDirections, Rows, contract, directions_of, rows_of
+from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
@@ -280,6 +281,7 @@ def static_equilibrium(
 ) -> StaticEquilibrium:
     """Positions at which the rings rest; see `ballpass.runtime.Model.static_equilibrium`."""
     found = _equilibrium(model, numbers, t, load)
+    _refuse_void(found)
     free = found.free_directions
     if len(free):
         warnings.warn(
@@ -444,6 +446,16 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
         numbers=numbers,
         load_is_given=load is not None,
     )
+
+
+def _refuse_void(found: StaticEquilibrium) -> None:
+    """Refuse rings at rest on balls that are flattened as none can be."""
+    first = 0
+    for bearing in found.model.manifest.bearings:
+        deflection = float(np.max(found.deflection[first : first + bearing.balls]))
+        if words := void_words(bearing, found.numbers.values, deflection):
+            raise SimulationError(f"static_equilibrium: {words}")
+        first += bearing.balls
 
 
 def _force_rows(model: LoadedModel) -> Rows:

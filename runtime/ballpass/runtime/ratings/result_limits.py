@@ -36,6 +36,14 @@ def passed_limit(ball: float, deflection: float, displaced: float) -> Limit | No
     return "deflected" if deflection > MOST_DEFLECTION * ball else None
 
 
+def void_words(bearing: BearingInfo, values: Mapping[str, float], deflection: float) -> str:
+    """Why results with this largest deflection of a ball [m] mean nothing; empty where they mean something."""
+    ball, clearance = (values[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
+    displaced = deflection + clearance / 2.0
+    limit = passed_limit(ball, deflection, displaced)
+    return limit_words(bearing, limit, ball=ball, deflection=deflection, displaced=displaced) if limit in VOID else ""
+
+
 def limit_templates(bearing: BearingInfo) -> Mapping[Limit, str]:
     """A sentence for each limit, over `deflection` and `displaced` [mm], and the `share` of the diameter [%]."""
     noun = rated_element(bearing).noun

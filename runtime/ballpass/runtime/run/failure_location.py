@@ -16,7 +16,7 @@ from ballpass.runtime.run.magnitudes import mass_matrix
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ballpass.runtime.contract.manifest import CoordinateInfo
+    from ballpass.runtime.contract.manifest import CoordinateInfo, Manifest
     from ballpass.runtime.contract.parameters import Numbers
     from ballpass.runtime.native.loaded_model import LoadedModel
 
@@ -113,7 +113,17 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     )
 
 
-def _relative(coordinate: CoordinateInfo, at: Mapping[str, int], state: np.ndarray) -> float:
+def ring_distances(manifest: Manifest, x: np.ndarray) -> np.ndarray:
+    """Distances of the rings of each bearing [m], at states of shape (states, .): shape (bearings, .)."""
+    at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
+    found = [
+        np.hypot(*(_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, x) for axis in "xy"))
+        for bearing in manifest.bearings
+    ]
+    return np.array(found).reshape(len(found), *x.shape[1:])
+
+
+def _relative(coordinate: CoordinateInfo, at: Mapping[str, int], state: np.ndarray) -> np.ndarray:
     """A coordinate, less its partner's where it has one."""
     value = state[at[coordinate.name]]
-    return float(value - state[at[coordinate.partner]] if coordinate.partner else value)
+    return np.asarray(value - state[at[coordinate.partner]] if coordinate.partner else value)

@@ -16,7 +16,7 @@ class IntegrationError(SimulationError):
     Attributes
     ----------
     status : why
-    time : how far it came [s]
+    time : how far it came; of void results, when a ball is flattened most [s]
     crank_angle : angle of driver or shaft at that time [rad]
     ball : the ball with the largest deflection then, counted from 1; None where there is none
     partial : the samples up to that time

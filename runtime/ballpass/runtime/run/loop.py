@@ -12,7 +12,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.method_registry import CHOICE, STEPPERS
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.native.reduction_rows import void_words
+from ballpass.runtime.native.reduction_rows import HEAD, void_moment
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
 from ballpass.runtime.run.failure_location import FailureLocation, locate_failure, stall_words
 from ballpass.runtime.run.limits import allowance
@@ -276,13 +276,24 @@ class RunUnderWay:
         self._refuse_void()
 
     def _refuse_void(self) -> None:
-        """Refuse results in which a ball is flattened as none can be."""
-        run = self.run
+        """Refuse results in which a ball is flattened as none can be, at the moment where it is most.
+
+        They are those behind the transient; all of a run that ends within it.
+        """
+        run, values = self.run, self.run.numbers.values
         for sink in self.sinks:
-            why = void_words(run.model.manifest, run.numbers.values, sink.row) if isinstance(sink, ReductionRow) else ""
-            if why:
-                place = locate_failure(run.model, run.numbers, self.time, self.state)
-                raise RunFailed(End.VOID, self.time, 0.0, self.state, place, why)
+            if not isinstance(sink, ReductionRow):
+                continue
+            within = not sink.row[HEAD.index("duration")] > 0.0
+            row = sink.before if within and sink.before is not None else sink.row
+            found = void_moment(run.model.manifest, values, row)
+            if found is not None:
+                why, time = found
+                there = start_run(replace(run, progress=None), [])
+                if time > run.begin:
+                    there.go_on(time)  # again, for the state at that moment
+                place = locate_failure(run.model, run.numbers, time, there.state)
+                raise RunFailed(End.VOID, time, 0.0, there.state, place, why)
 
     def _count(self, outcome: Outcome) -> None:
         self.steps += outcome.steps

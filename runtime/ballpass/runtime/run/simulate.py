@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time as clocks
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -19,13 +20,16 @@ import numpy as np
 
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.reduction_rows import DEFLECTION, reduction_rows, void_moment
+from ballpass.runtime.native.stepper import End
+from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.casadi_run import integrate
-from ballpass.runtime.run.failure_location import locate_failure
+from ballpass.runtime.run.failure_location import locate_failure, ring_distances
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.locating import LOCATED, kinks_with_derivatives
 from ballpass.runtime.run.loop import ReductionRow, RunFailed, RunUnderWay, Samples, Sink, start_run
@@ -65,6 +69,7 @@ def simulate(
     channels = reduced_channels(model.manifest, sampling.outputs)
     rows = reduction_rows(model.manifest).empty(2, [run.start, 0.0], channels)
     by_stepper = run.method in STEPPERS
+    reducing = by_stepper and channels and directions is None
     going: RunUnderWay | None = None
     failure: RunFailed | Interrupted | None = None
     try:
@@ -72,7 +77,6 @@ def simulate(
             samples = Samples(
                 times=trajectory.t, x=trajectory.x, near=trajectory.near, end=run.end, directions=directions
             )
-            reducing = channels and directions is None
             sinks: list[Sink] = [samples, *([ReductionRow(row=rows[0], before=rows[1])] if reducing else [])]
             going = start_run(run, sinks, trajectory.segments)
             try:
@@ -81,6 +85,12 @@ def simulate(
                 _note(trajectory, samples, going)
         else:
             integrate(run, trajectory)
+        if not reducing:
+            _refuse_void(run, trajectory)
+        elif found := void_moment(model.manifest, numbers.values, rows[1]):
+            warnings.warn(
+                f"Before the turns that count, t = {found[1]:.9g} s: {found[0]}", UnusualWarning, stacklevel=4
+            )
     except (RunFailed, Interrupted) as end:
         failure = end
     last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial
@@ -96,6 +106,8 @@ def simulate(
         )
         for row in rows
     )
+    if failure is not None and failure.status is Status.VOID:
+        trajectory.finished = int(np.searchsorted(trajectory.t[: trajectory.finished], failure.time, side="right"))
     done = trajectory.finished
     solution = Solution(
         t=trajectory.t[:done],
@@ -119,6 +131,26 @@ def simulate(
             failure.status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
         )
     return solution
+
+
+def _refuse_void(run: Run, trajectory: Trajectory) -> None:
+    """Refuse samples in which a ball is flattened as none can be, where nothing else than samples is kept of a run."""
+    manifest, values, samples = run.model.manifest, run.numbers.values, trajectory.finished
+    first = int(np.searchsorted(trajectory.t[:samples], run.start - trajectory.near))
+    counted = slice(first if first < samples else 0, samples)
+    apart = ring_distances(manifest, trajectory.x[counted].T)
+    # far from it wherever the balls are
+    near = [values[f"{bearing.path}.ball_diameter"] * FLATTENED / 2.0 for bearing in manifest.bearings]
+    if not apart.size or np.all(np.max(apart, axis=1) < near):
+        return
+    names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
+    found = evaluate_outputs(run.model, run.numbers, trajectory, names)
+    for bearing, name in zip(manifest.bearings, names, strict=True):
+        most = np.max(found[name][counted], axis=1)
+        worst = int(np.argmax(most))
+        if words := void_words(bearing, values, float(most[worst])):
+            time, state = float(trajectory.t[counted][worst]), trajectory.x[counted][worst]
+            raise RunFailed(End.VOID, time, 0.0, state, locate_failure(run.model, run.numbers, time, state), words)
 
 
 def _note(trajectory: Trajectory, samples: Samples, going: RunUnderWay) -> None:
