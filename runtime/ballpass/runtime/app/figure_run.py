@@ -1,7 +1,7 @@
 """A run of many turns for figures that need them: stroboscopic points, and spectra that resolve near lines.
 
-In: a model and a run of it.  Out: a run that continues it, or None where it is long enough or a longer
-one takes too much time.
+In: a model and a run of it.  Out: a run that continues it, or None where it is long enough, a longer one takes too much
+time, or its turns are unlike later ones.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from ballpass.runtime.quantity.characteristic import turns_to_separate
+from ballpass.runtime.run.settle import repeats
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -39,6 +40,8 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         return None
     done = (solution.t[-1] - statistics.begin) / length
     numbers = {**solution.parameters, **solution.constants}
+    if not repeats(model, numbers, solution.transient_cycles * length):
+        return None
     turns = turns_to_separate(solution.manifest, numbers)
     if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
         return None

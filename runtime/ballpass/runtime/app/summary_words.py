@@ -64,7 +64,8 @@ def row_words(manifest: Manifest, name: str) -> str:
 def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> str:
     """A number of the summary with four digits, or with those that hold over moved starts, and its uncertainty.
 
-    That is twice the standard deviation over moved starts, or the distance of the number from their mean.
+    That is twice the standard deviation over moved starts, or the distance of the number from their mean if they are of
+    the same turns.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> s
     value, spread = item[key], item.get("over_starts", {}).get(key)
     if spread is None or value == 0.0:
         return rounded(factor * value)
-    apart = max(2.0 * spread["std"], abs(value - spread["mean"]))
+    apart = max(2.0 * spread["std"], abs(value - spread.get("mean", value)))
     if apart < 5e-5 * abs(value):  # all of four
         return rounded(factor * value)
     digits = min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(apart)) + 1, 1), 4)

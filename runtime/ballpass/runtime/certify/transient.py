@@ -41,7 +41,8 @@ def find_transient(model: LoadedModel) -> RunInfo:
     numbers = model.numbers()
     if given.cycles is None or not (model.has_stepper and model.states):
         return given
-    if not repeats(model, driver_angle.period(model.manifest, numbers.values)):
+    turn = driver_angle.period(model.manifest, numbers.values)
+    if not repeats(model, numbers.values, given.transient_cycles * turn):
         return given
     transient, length, left = given.transient_cycles, given.cycles - given.transient_cycles, SEARCH
     try:

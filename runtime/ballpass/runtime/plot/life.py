@@ -93,7 +93,7 @@ def life_of_clearance(
     lives: Mapping[str, Array],
     present: float,
     group: tuple[str, float, float] | None,
-    turns: float,
+    turns: float | None,
 ) -> Figure:
     """Life by every reading against the clearance.
 
@@ -103,7 +103,7 @@ def life_of_clearance(
     lives : by reading, shape (points,) [turns]
     present : clearance of the scene [m]
     group : name and range of the bearing's group of clearance [m]; None where the scene names none
-    turns : steady turns of each point
+    turns : steady turns of each point; None: as long as the scene says
     """
     figure = new_figure(4.4)
     panel = figure.add_subplot()
@@ -119,7 +119,8 @@ def life_of_clearance(
         loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
     )  # it may lie on the group
     shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""
-    words = f"{len(clearances)} runs of {turns:.4g} steady turns. Dotted: the scene's clearance.{shaded}"
+    length = "the scene's length" if turns is None else f"{turns:.4g} steady turns"
+    words = f"{len(clearances)} runs of {length}. Dotted: the scene's clearance.{shaded}"
     caption(figure, f"{_titled(title, bearing)}: life against clearance", words)
     return figure
 

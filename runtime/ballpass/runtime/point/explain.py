@@ -45,7 +45,8 @@ MOST_NAMED = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Breakpoint:
-    """A time of the first turn, or of as many as loads repeat after, at which a load switches or a table has a knot.
+    """A time of the first turn, or of as many as loads repeat after, at which a load switches or a table has a knot; of
+    tables over time any of the run.
 
     Time [s], driver angle [rad], which counts over these turns, and cause.
     """
@@ -126,8 +127,10 @@ class Explanation(ShortRepr, Reported):
     turns: int = 1
 
     def _report(self) -> Report:
-        where = _places(self.breakpoints) or "none"
+        repeats = self.turns * self.turn
+        where = _places(self.breakpoints, repeats) or "none"
         first = "turn" if self.turns == 1 else f"{self.turns} turns"
+        first += " and of tables over time" if any(item.time >= repeats for item in self.breakpoints) else ""
         laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "none"
         parts: list[Words | ReportTable] = [
             Marked(f"Breakpoints of the first {first}", "head", f": {where}"),
@@ -142,7 +145,7 @@ class Explanation(ShortRepr, Reported):
         )
         rows = [
             (
-                item.name,
+                item.name if item.time < repeats else f"{item.name}, {item.time:.4g} s",
                 f"{math.degrees(item.angle):.0f}°",
                 f"{rounded(item.decay, 3)} 1/s",
                 f"{rounded(item.frequency / math.tau, 3)} Hz",
@@ -201,14 +204,15 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     turn = driver_angle.period(manifest, values)
     turns = driver_angle.cycle_turns(values)
     span = turns * turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
-    scales, unsupported = _time_scales(model, parameters, span) if model.states else ((), ())
+    length = max(span, _changing(model, values, turn))
+    scales, unsupported = _time_scales(model, parameters, span, length) if model.states else ((), ())
     method, reason = _method(model, scales, turn)
     return Explanation(
         states=model.states,
         outputs=model.outputs,
         turn=turn,
         turns=turns,
-        breakpoints=_breakpoints(model, values, span),
+        breakpoints=_breakpoints(model, values, span, length),
         smoothness=manifest.smoothness,
         scales=scales,
         unsupported=unsupported,
@@ -219,21 +223,36 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     )
 
 
-def _places(breakpoints: Sequence[Breakpoint]) -> str:
-    """Where the breakpoints are; of many, how many each load has."""
-    degrees = [f"{math.degrees(item.angle):.4g}°" for item in breakpoints]
+def _places(breakpoints: Sequence[Breakpoint], repeats: float) -> str:
+    """Where the breakpoints are, those of tables over time behind the first turns by their time; of many, how many each
+    load has."""
+    places = [
+        f"{item.time:.4g} s" if item.time >= repeats else f"{math.degrees(item.angle):.4g}°" for item in breakpoints
+    ]
     if len(breakpoints) <= MOST_NAMED:
-        return "; ".join(f"{at} {item.cause}" for at, item in zip(degrees, breakpoints, strict=True))
+        return "; ".join(f"{at} {item.cause}" for at, item in zip(places, breakpoints, strict=True))
     times = Counter(cause for item in breakpoints for cause in item.cause.split(", "))
     loads = ", ".join(f"{cause} {count} times" for cause, count in times.items())
-    return f"{len(breakpoints)} from {degrees[0]} to {degrees[-1]}: {loads} (each: --json)"
+    return f"{len(breakpoints)} from {places[0]} to {places[-1]}: {loads} (each: --json)"
 
 
-def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -> tuple[Breakpoint, ...]:
+def _changing(model: LoadedModel, values: Mapping[str, float], turn: float) -> float:
+    """Time over which loads change but with the turn [s]: with tables over time the run, else a harmonic's period."""
+    run = model.manifest.run
+    length = run.duration or (run.cycles * turn if run.cycles is not None and math.isfinite(turn) else 0.0)
+    if driver_angle.changes_over_time(model.manifest, values, 0.0, length):
+        return length
+    rates = [values[item.rate] for item in model.manifest.inputs if item.rate.endswith(".angular_frequency")]
+    return min(length, max((driver_angle.TURN / rate for rate in rates), default=0.0))
+
+
+def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, length: float) -> tuple[Breakpoint, ...]:
     found = []
     inputs = model.manifest.inputs
     # a little over the turn's end, so that an edge at t = 0 counts once
-    for time in driver_angle.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9)):
+    times = driver_angle.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9))
+    timed = driver_angle.rows_over_time(model.manifest, values, span * (1.0 - 1e-9), length)
+    for time in [*times, *timed]:
         before = driver_angle.inputs_at(inputs, values, time, time - 1e-7 * span)
         behind = driver_angle.inputs_at(inputs, values, time, time + 1e-7 * span)
         causes = dict.fromkeys(  # the components of a load share their knots
@@ -264,17 +283,21 @@ def _knot(slope: str) -> str:
 
 
 def _time_scales(
-    model: LoadedModel, parameters: Mapping[str, float] | None, span: float
+    model: LoadedModel, parameters: Mapping[str, float] | None, span: float, length: float
 ) -> tuple[tuple[TimeScale, ...], tuple[str, ...]]:
     numbers = model.numbers(parameters)
     values = numbers.values
     half = len(model.states) // 2
     rest = np.array([values[name] for name in model.manifest.initial])
     rest[half:] *= held_coordinates(model)
-    times = (np.arange(INSTANTS) + 0.5) / INSTANTS * span
+    even = (np.arange(INSTANTS) + 0.5) / INSTANTS
+    times = even * span
+    if length > span:
+        rows = driver_angle.rows_over_time(model.manifest, values, 0.0, length)
+        times = np.concatenate([times, even * length, rows])
     # at the initial position, so that contact forces are those of t = 0 and only the load differs between instants
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
-    pull = np.empty(INSTANTS)
+    pull = np.empty(len(times))
     for k, time in enumerate(times):
         u = driver_angle.inputs_at(model.manifest.inputs, values, float(time))
         free = 1.0 - held_coordinates(model)

@@ -129,7 +129,8 @@ def _clearance(
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.readings import READINGS
-    from ballpass.runtime.run.driver_angle import whole_cycles
+    from ballpass.runtime.run.driver_angle import period, whole_cycles
+    from ballpass.runtime.run.settle import repeats
 
     name = f"{info.path}.clearance"
     present = model.numbers(overrides).values[name]
@@ -141,9 +142,12 @@ def _clearance(
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
-    transient, turns = model.run_settings.transient_cycles, whole_cycles(model.numbers(overrides).values, TURNS)
+    transient, values = model.run_settings.transient_cycles, model.numbers(overrides).values
+    alike = repeats(model, values, transient * period(model.manifest, values))
+    turns = whole_cycles(values, TURNS) if alike else None
     asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
-    found = model.simulate_many(table, list(asked.values()), cycles=transient + turns)
+    cycles = None if turns is None else transient + turns
+    found = model.simulate_many(table, list(asked.values()), cycles=cycles)
     if found.interrupted:
         raise KeyboardInterrupt
     lives = {reading: found[observable] for reading, observable in asked.items()}

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
@@ -397,7 +396,7 @@ def spectrum(
         position, height = position[within], height[within]
     marks = characteristic_lines(solution.manifest, numbers, orders=orders)
     if not carries_lines(solution.manifest, of):
-        marks = tuple(mark for mark in marks if mark.name == "shaft")
+        marks = tuple(mark for mark in marks if not mark.of_bearing)
     changing = run.period is None and run.cycle_length is not None
     return SignalSpectrum(
         of=of,
@@ -454,17 +453,17 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 
 
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
-    """Turns of a run that separates ball pass from the shaft; None where a table gives the speed or nothing turns."""
+    """Turns of a run that separates ball pass from the shaft; None for those of the scene, where turns differ."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
     from ballpass.runtime.run.driver_angle import period
+    from ballpass.runtime.run.settle import repeats
 
     manifest, values = model.manifest, model.numbers(parameters).values
-    turn = period(manifest, values)
-    if not math.isfinite(turn) or any(item.name == DRIVER_ACCELERATION for item in manifest.inputs):
-        return None
-    settings = model.run_settings
-    stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
+    turn, settings = period(manifest, values), model.run_settings
     dropped = settings.transient_cycles if transient is None else transient
+    if not repeats(model, values, dropped * turn):
+        return None
+    stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
     return max(stated, dropped + turns_to_separate(manifest, values))
 
 

@@ -168,6 +168,17 @@ def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, insi
     return found
 
 
+def rows_over_time(manifest: Manifest, values: Values, begin: float, end: float) -> np.ndarray:
+    """Times in (begin, end) of rows of tables over time: load or its window, driver's speed, cage's slip [s]."""
+    tables = [item for item in manifest.inputs if item.kind in ("table", "table_rate") and not item.rate]
+    return breakpoints(tables, values, begin, end)
+
+
+def changes_over_time(manifest: Manifest, values: Values, begin: float, end: float) -> bool:
+    """Whether a table over time has a row in (begin, end) [s]: turns there are unlike each other."""
+    return len(rows_over_time(manifest, values, begin, end)) > 0
+
+
 def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: float) -> np.ndarray:
     """Times in the open interval (t0, t1) at which a gate switches or a table has a knot.
 

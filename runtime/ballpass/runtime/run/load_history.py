@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, TURNED, reduction_rows
@@ -25,7 +24,7 @@ from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, asked_transient, resolve
-from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
+from ballpass.runtime.run.settle import LEAST, MOST, PEAKS, repeats
 
 #: Relative change of a life that counts as zero [1].
 LIVES = 1e-2
@@ -62,7 +61,7 @@ class LoadHistory:
 def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> LoadHistory:
     """Add up the loads of the balls, over the turns asked for, else over as many as lives take to settle.
 
-    Where nothing turns, or a table gives the speed over time, a run is as long as the scene says.
+    Where nothing turns, or speed, load or slip follow a table over time, a run is as long as the scene says.
 
     Raises
     ------
@@ -74,9 +73,8 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     manifest = model.manifest
     turn = driver_angle.period(manifest, numbers.values)
     transient = asked_transient(model, request.transient_cycles)
-    timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
     given = request.cycles is not None or request.duration is not None
-    doubles = not given and not timed and math.isfinite(turn)
+    doubles = not given and repeats(model, numbers.values, transient * turn)
     turns = driver_angle.whole_cycles(numbers.values, LEAST)
     if doubles:
         request = replace(request, cycles=transient + turns)

@@ -99,7 +99,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     Raises
     ------
     RequestError
-        A wrong request, or nothing turns.
+        A wrong request, nothing turns, or something follows a table over time.
     SimulationError
         The computation failed.
     """
@@ -112,6 +112,12 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
+    if driver_angle.changes_over_time(model.manifest, numbers.values, run.start, run.start + MOST * turn):
+        raise RequestError(
+            "settle: load, speed or slip of this scene follow a table or a window over time, so that its turns are "
+            "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
+            "are meant, without settle."
+        )
     going, counter = start_reducing(run, channel_names(model.manifest)), _counter(model)
     going.go_on()
     before, lost = going.take(), 0
@@ -162,7 +168,7 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
 def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
 
-    None where the run is about as long, nothing turns, or a table gives the speed over time.
+    None where the run is about as long, nothing turns, or something follows a table over time.
 
     Parameters
     ----------
@@ -174,7 +180,7 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
         The longer run failed.
     """
     model, turn = run.model, run.turn
-    if not repeats(model, turn):
+    if not repeats(model, run.numbers.values, run.start):
         return None
     if few is None:
         going = start_reducing(run, channel_names(model.manifest))
@@ -207,9 +213,12 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
 
 
-def repeats(model: LoadedModel, turn: float) -> bool:
-    """Whether something turns, and no table gives the speed over time."""
-    return math.isfinite(turn) and all(item.name != DRIVER_ACCELERATION for item in model.manifest.inputs)
+def repeats(model: LoadedModel, values: Mapping[str, float], begin: float) -> bool:
+    """Whether turns from a time on [s] are alike: no table gives the speed over time, or changes anything behind it."""
+    turn = driver_angle.period(model.manifest, values)
+    if not math.isfinite(turn) or any(item.name == DRIVER_ACCELERATION for item in model.manifest.inputs):
+        return False
+    return not driver_angle.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
 
 
 def _dropped(transient: float, begin: float, turn: float) -> float:

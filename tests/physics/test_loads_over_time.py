@@ -1,0 +1,68 @@
+"""Loads that follow a table over time: answers are those of the scene's turns, for later ones are unlike them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.figure_run import run_for_figures
+from ballpass.runtime.app.transient_words import warnings_of_transient
+
+#: The rotor's scene gives 60 turns, 1.2 s, here without the first five; most of it is heavily loaded.
+TRANSIENT, HEAVY, LENGTH = 0.1, 1.0, 1.2
+BURST = f"""[loads.work]
+type = "table"
+time = ["0 s", "{HEAVY} s", "1.005 s", "{LENGTH} s"]
+x = ["0 N", "0 N", "0 N", "0 N"]
+y = ["-1000 N", "-1000 N", "0 N", "0 N"]
+
+"""
+KEPT = ("transient_cycles = 20", "transient_cycles = 5")
+
+
+@pytest.fixture(scope="module")
+def worked(make_model: Callable[..., Model]) -> Model:
+    return make_model("rotor", ("[bearing]\n", BURST + "[bearing]\n"), KEPT)
+
+
+def test_life_is_that_of_the_load_in_the_scenes_turns(worked: Model) -> None:
+    """The heavy load alone lasts L; a part of the time it lasts longer by that part (the light one does no damage)."""
+    (found,) = worked.life().bearings
+    (alone,) = worked.life(parameters={"loads.work.y.3": -1000.0, "loads.work.y.4": -1000.0}).bearings
+    heavy = (HEAVY - TRANSIENT) / (LENGTH - TRANSIENT)
+    for reading, turns in alone.lives.items():
+        assert found.hours(found.lives[reading]) == pytest.approx(alone.hours(turns) / heavy, rel=0.02)
+
+
+def test_no_answer_takes_turns_behind_the_table(worked: Model) -> None:
+    run = worked.simulate()
+    assert worked.spectrum("inner.y").resolution == pytest.approx(1.0 / (LENGTH - TRANSIENT), rel=1e-9)
+    assert run_for_figures(worked, run) is None
+    with pytest.raises(RequestError, match="table or a window over time"):
+        worked.settle()
+    # the peak of the heavy load is no impact of the start
+    assert warnings_of_transient(worked, {}, cycles=20, transient=2) == []
+
+
+def test_turns_behind_the_last_row_are_alike(worked: Model) -> None:
+    behind = math.ceil(LENGTH / worked.period()) + 10
+    found = worked.settle(transient=behind)
+    assert found.settled
+    assert found.reductions["ball.force"].maximum < 100.0
+    assert worked.life(transient=behind).states[0].turns >= 128
+
+
+def test_explain_finds_the_heaviest_load_of_the_run(make_model: Callable[..., Model]) -> None:
+    """A burst behind half a second, of which the first turn knows nothing."""
+    late = BURST.replace('["0 s", "1.0 s", "1.005 s"', '["0 s", "0.5 s", "0.51 s"').replace(
+        '"-1000 N", "-1000 N"', '"0 N", "-1000 N"'
+    )
+    found = make_model("rotor", ("[bearing]\n", late + "[bearing]\n"), KEPT).explain()
+    lightest, heaviest = found.scales
+    assert heaviest.time == pytest.approx(0.5, abs=0.02)  # the unbalance turns on it
+    assert heaviest.frequency > 1.5 * lightest.frequency
+    assert [item.time for item in found.breakpoints] == pytest.approx([0.0, 0.5, 0.51])
+    assert "tables over time: 0° knot of the load; 0.5 s knot of the load" in " ".join(str(found).split())
