@@ -197,6 +197,17 @@ def test_one_loaded_ball_leaves_the_ring_free_sideways(bearing_6204: Model) -> N
         found.derivative("positions", "bearing.clearance")
 
 
+def test_a_ball_that_only_touches_holds_no_ring(bearing_6204: Model) -> None:
+    """The ring leans on a second ball with what rounding of the first one's angle makes of the load: 0.7 nN of 50 N."""
+    parameters = {"bearing.clearance": 2e-5, "bearing.ball_angle": 1e-11}
+    with pytest.warns(FreeRingWarning, match=r"inner\.y"):
+        found = bearing_6204.static_equilibrium(parameters=parameters, load=(50.0, 0.0))
+    assert np.sort(found.ball_force)[-2] < 1e-9
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bearing_6204.static_equilibrium(parameters={**parameters, "bearing.ball_angle": 1e-4}, load=(50.0, 0.0))
+
+
 def test_what_cannot_be_in_equilibrium_is_refused(bearing_6204: Model, press: Model) -> None:
     with pytest.raises(RequestError, match="may stand anywhere"):
         bearing_6204.static_equilibrium(parameters={"bearing.clearance": 1e-5}, load=(0.0, 0.0))

@@ -29,7 +29,7 @@ from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
+from ballpass.runtime.run.equilibrium_newton import FIRST_STEP, SearchEnd, settle
 from ballpass.runtime.run.request import check_length
 
 Array = NDArray[np.float64]
@@ -48,6 +48,9 @@ DRIVER_STEP = 1e-6
 
 #: Stiffness below this fraction of the largest counts as none.
 FREE = 1e-9
+
+#: The same of rings that are moved, along directions that are not those of a matrix to the last digit [1].
+YIELDING = 1e-7
 
 
 class FreeRingWarning(BallpassWarning):
@@ -422,7 +425,18 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     q = found.q
     matrix = stiffness(q)
     eigenvalues, vectors = np.linalg.eigh(matrix)
-    free = vectors[:, eigenvalues <= FREE * max(float(eigenvalues[-1]), 0.0)].T
+    stiffest = max(float(eigenvalues[-1]), 0.0)
+
+    def yields(direction: Array) -> bool:
+        """Whether rings move away to one side without force: a ball that only just touches holds the other side."""
+        back = [abs(float(direction @ force(q + side * FIRST_STEP * direction))) for side in (-1.0, 1.0)]
+        return min(back) <= YIELDING * stiffest * FIRST_STEP
+
+    rings = [bool(np.sum(vector[held] ** 2) < 0.5) for vector in vectors.T]
+    alone = [
+        k for k, found in enumerate(eigenvalues) if found <= FREE * stiffest or (rings[k] and yields(vectors[:, k]))
+    ]
+    free = vectors[:, alone].T
     state = np.concatenate([q, velocity])
     if len(free) and not np.any(applied) and float(np.max(_balls(model, numbers, t, state)[0])) < 0.0:
         raise RequestError(
