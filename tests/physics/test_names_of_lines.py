@@ -15,8 +15,17 @@ from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.run.solution_file import load_solution
 
 DAMAGED = re.compile("BPFI|BSF|FTF")
-LONG = ("crank_shaper", "four_bar", "offset_slider", "punching_press_hinges", "punching_press_motor")
+LONG = (
+    "crank_shaper",
+    "eccentric_pump",
+    "four_bar",
+    "offset_slider",
+    "punching_press_hinges",
+    "punching_press_motor",
+    "punching_press_roller",
+)
 SCENES = (
+    "engine",
     "punching_press",
     "rotor",
     *(
@@ -36,7 +45,10 @@ def test_a_healthy_machine_has_no_line_of_a_damaged_bearing(make_model: Callable
         found = model.spectrum(channel, orders=orders, **run)
         assert not [name for name in found.names if DAMAGED.search(name)], (turns, orders)
         # a motor's speed changes within the turn, and its lines lie between the multiples of the mean
-        assert found.names[0] in {"shaft", "BPFO"} or scene in ("varying_compliance", "punching_press_motor")
+        assert found.names[0] in {"1/2 shaft", "shaft", "BPFO"} or scene in (
+            "varying_compliance",
+            "punching_press_motor",
+        )
 
 
 def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make_model: Callable[..., Model]) -> None:
@@ -49,6 +61,24 @@ def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make
     long = model.spectrum("inner.x", orders=True)
     assert long.alternatives[long.names.index("4 shaft")] == ""
     assert long.resolution == pytest.approx(0.01)
+
+
+def test_a_line_of_a_load_with_a_frequency_of_its_own_is_no_bearings(make_model: Callable[..., Model]) -> None:
+    """A load at the frequency of BPFI, and one between all lines."""
+    push = """[loads.push]
+type = "harmonic"
+mean = ["0 N", "0 N"]
+amplitude = ["20 N", "0 N"]
+frequency = "247.4 Hz"
+phase = "0 deg"
+
+"""
+    model = make_model("rotor", ("[bearing]\n", push + "[bearing]\n"), ('"load.*"]', '"load.*", "inner.*"]'))
+    for frequency in (247.4, 333.3):
+        found = model.spectrum("inner.x", parameters={"loads.push.frequency": frequency})
+        nearest = np.argmin(np.abs(found.position[list(found.highest)] - frequency))
+        assert found.names[nearest] == "load push"
+        assert [mark.name for mark in model.spectrum("load.x").marks] == ["shaft", "load push"]
 
 
 def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:

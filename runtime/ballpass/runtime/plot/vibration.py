@@ -76,11 +76,11 @@ def draw_lines(
     axes.set_xlim(0.0, limit)
     unit = " Hz" if across.endswith("[Hz]") else ""
     looks = []
-    bearings = list(dict.fromkeys(mark.bearing for mark in marks if mark.name != "shaft"))
+    bearings = list(dict.fromkeys(mark.bearing for mark in marks if mark.of_bearing))
     for mark in marks:
         every = mark.frequency * np.arange(1, (1 if mark.name == "FTF" else MARKED) + 1)
-        every, look = every[every <= limit], _LOOKS[mark.name]
-        head = _HEADS[bearings.index(mark.bearing) % len(_HEADS)] if mark.name != "shaft" else _HEADS[0]
+        every, look = every[every <= limit], _LOOKS.get(mark.name, _LOOKS["shaft"])
+        head = _HEADS[bearings.index(mark.bearing) % len(_HEADS)] if mark.of_bearing else _HEADS[0]
         axes.vlines(every, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
         if head:
             heads = {"marker": head, "color": look["color"], "linestyle": "none", "markersize": 5.0}
@@ -123,7 +123,7 @@ def draw_spectrogram(
     axes.set_xlabel("time [s]")
     axes.set_ylabel("frequency [Hz]")
     for mark in orders:
-        axes.plot(found.time, mark.frequency * speed, label=mark.label, **_LOOKS[mark.name])
+        axes.plot(found.time, mark.frequency * speed, label=mark.label, **_LOOKS.get(mark.name, _LOOKS["shaft"]))
     if orders:
         axes.legend(ncols=min(len(orders), 5), **_ABOVE)
     axes.set_ylim(0.0, float(found.frequency[-1]))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -32,6 +33,12 @@ NEARLY_AS_SIMPLE, SIMPLE, MOST_NEAR = 2, 8, 2
 #: window's width; and the most turns that these may cost.
 TURNS, APART, MOST = 100, 5.0, 400
 
+#: Names of what is of a bearing.
+OF_BEARINGS = ("FTF", "BPFO", "BPFI", "2 BSF")
+
+#: What the rate of a harmonic load is called, behind its path.
+HARMONIC = ".angular_frequency"
+
 #: Speeds of the balls over both rings, behind the path of a bearing.
 PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
 
@@ -41,15 +48,16 @@ LINKAGE = ("reaction.", "drive_", "driver.", "body.", "point.", "spring.", "stop
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CharacteristicLine:
-    """A characteristic frequency of a bearing.
+    """A characteristic frequency of a bearing or of the machine.
 
     Attributes
     ----------
-    name : "shaft", "FTF", "BPFO", "BPFI" or "2 BSF"
-    bearing : name of the bearing, "" for the scene's only one and for the shaft
+    name : "FTF", "BPFO", "BPFI" or "2 BSF"; "shaft", or a harmonic load of a frequency of its own, as "load push"
+    bearing : name of the bearing, "" for the scene's only one and for the machine
     frequency : [Hz], or [1] as an order
-    side : distance of its sidebands, in the same unit; 0 for the shaft and the cage, which have none
+    side : distance of its sidebands, in the same unit; 0 for the machine and the cage, which have none
     side_name : what that is, "shaft" or "FTF"
+    parts : into which its lines divide it: an engine whose loads repeat after two turns has lines of half a shaft
     """
 
     name: str
@@ -57,6 +65,12 @@ class CharacteristicLine:
     frequency: float
     side: float
     side_name: str
+    parts: int = 1
+
+    @property
+    def of_bearing(self) -> bool:
+        """Whether it is of a bearing; else it is there without one."""
+        return self.name in OF_BEARINGS
 
     @property
     def label(self) -> str:
@@ -89,7 +103,7 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
 def characteristic_lines(
     manifest: Manifest, values: Mapping[str, float], *, orders: bool = False
 ) -> tuple[CharacteristicLine, ...]:
-    """Lines of the shaft and of every bearing; none where nothing turns.
+    """Lines of the shaft, of harmonic loads and of every bearing; none where nothing turns.
 
     Parameters
     ----------
@@ -105,7 +119,12 @@ def characteristic_lines(
         return ()
     unit = speed if orders else 1.0
     shaft = speed / unit
-    found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="")]
+    parts = driver_angle.cycle_turns(values)
+    found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="", parts=parts)]
+    for rate in dict.fromkeys(item.rate for item in manifest.inputs if item.rate.endswith(HARMONIC)):
+        name = rate.removesuffix(HARMONIC).replace("loads.", "load ")
+        frequency = abs(values[rate]) / driver_angle.TURN / unit
+        found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=0.0, side_name=""))
     for bearing in manifest.bearings:
         one = frequencies_of(bearing, values)
         cage, turning = one.cage / unit, one.shaft / unit
@@ -150,7 +169,7 @@ class LineName:
     frequency : of that, in the unit of the lines
     rank : how far from simple the words are
     beside : distance from the line of the spectrum, in lines of the spectrum [1]
-    of_shaft : whether it is the shaft alone
+    of_machine : whether it is the shaft or a load alone
     of_load : whether it is of balls that pass the load, as those of a healthy bearing do
     """
 
@@ -158,7 +177,7 @@ class LineName:
     frequency: float
     rank: int
     beside: float
-    of_shaft: bool
+    of_machine: bool
     of_load: bool
 
 
@@ -166,8 +185,8 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     """What a line of a spectrum is, then as simple names that the record cannot tell from it; empty for nothing.
 
     The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
-    name of a bearing from a multiple of the shaft, the shaft wins.  So does a simpler name of balls that pass the load,
-    as those of a healthy bearing do, against one of damage.
+    name of a bearing from a multiple of the shaft or of a load, that wins.  So does a simpler name of balls that pass
+    the load, as those of a healthy bearing do, against one of damage.
 
     Parameters
     ----------
@@ -178,31 +197,30 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     for line in lines:
         if line.frequency == 0.0:
             continue
-        of_shaft = line.name == "shaft"
         for m in range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1) if line.side else (0,):
             most = MOST_OF_CAGE if line.name == "FTF" else MOST_SIDED if m else MOST_MULTIPLES
-            k = round((frequency - m * line.side) / line.frequency)
-            found = k * line.frequency + m * line.side
+            k = Fraction(round((frequency - m * line.side) / line.frequency * line.parts), line.parts)
+            found = float(k) * line.frequency + m * line.side
             beside = abs(frequency - found) / resolution
-            if (1 <= k <= most or (of_shaft and k >= 1)) and beside <= 1.0 + 1e-9:
+            if k > 0 and (k <= most or line.name == "shaft") and beside <= 1.0 + 1e-9:
                 fits.append(
                     LineName(
                         words=_words(k, m, line),
                         frequency=found,
-                        rank=k + 3 * abs(m),
+                        rank=math.ceil(k) + 3 * abs(m),
                         beside=beside,
-                        of_shaft=of_shaft,
+                        of_machine=not line.of_bearing,
                         of_load=line.name == "BPFO",
                     )
                 )
     if not fits:
         return ()
-    fits.sort(key=lambda name: (not name.of_shaft, name.beside + COMPLICATED * name.rank, name.words))
-    healthy = [name for name in fits if name.of_load and name.rank < fits[0].rank and not fits[0].of_shaft]
+    fits.sort(key=lambda name: (not name.of_machine, name.beside + COMPLICATED * name.rank, name.words))
+    healthy = [name for name in fits if name.of_load and name.rank < fits[0].rank and not fits[0].of_machine]
     first = healthy[0] if healthy and not fits[0].of_load else fits[0]
     others = [name for name in fits if name is not first]
     simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
-    near = [name for name in others if not name.of_shaft and name.rank <= simple]
+    near = [name for name in others if not name.of_machine and name.rank <= simple]
     return (first, *near[:MOST_NEAR])
 
 
@@ -213,11 +231,11 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
     ----------
     values : parameters and derived constants by name
     """
-    turns = TURNS
+    turns, parts = TURNS, driver_angle.cycle_turns(values)
     for bearing in manifest.bearings:
         found = frequencies_of(bearing, values)
         order = found.ball_pass_outer / found.shaft if found.shaft > 0.0 else 0.0
-        near = abs(order - round(order))
+        near = abs(order - round(order * parts) / parts)
         if near * MOST > APART:
             turns = max(turns, math.ceil(APART / near))
     return driver_angle.whole_cycles(values, turns)
@@ -232,7 +250,7 @@ def carries_lines(manifest: Manifest, channel: str) -> bool:
     return not (channel.startswith(loads) or (manifest.mechanism is not None and ideal and channel.startswith(LINKAGE)))
 
 
-def _words(k: int, m: int, line: CharacteristicLine) -> str:
+def _words(k: Fraction, m: int, line: CharacteristicLine) -> str:
     head = line.label if k == 1 else f"{k} x {line.label}" if line.name[0].isdigit() else f"{k} {line.label}"
     if m == 0:
         return head
