@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 import subprocess
@@ -575,6 +576,35 @@ def test_a_load_by_a_table_is_shaded_where_it_is_not_zero(make_virtual: Callable
     ):
         other = gather(model, model.simulate(cycles=0.01, transient=0, parameters=changed))
         assert np.degrees(other.load_windows()).tolist() == [pytest.approx(window) for window in expected], changed
+
+
+def test_loads_of_which_some_act_at_any_angle_are_not_shaded(make_virtual: Callable[..., Model]) -> None:
+    """All of a compressor of two cylinders was shaded, and its orbit had no line but that under the loads."""
+    second = """[mechanism.forces.other]
+body = "slider"
+point = "C"
+force = ["0 N", "-5 N"]
+window = { start = "260 deg", end = "240 deg" }
+
+[mechanism.forces.punch]"""
+    model = make_virtual("punching_press", ("[mechanism.forces.punch]", second))
+    for end, count in ((240.0, 0), (230.0, 2)):
+        numbers = {"mechanism.forces.other.window.end": math.radians(end)}
+        record = gather(model, model.simulate(cycles=0.01, transient=0, parameters=numbers))
+        assert len(record.load_windows()) == count
+
+
+def test_two_forces_at_one_point_have_words_apart(make_virtual: Callable[..., Model]) -> None:
+    """The second one's name was printed over the first one's size."""
+    second = """[mechanism.forces.weight]
+body = "slider"
+point = "C"
+force = ["0 N", "5000 N"]
+
+[mechanism.forces.punch]"""
+    model = make_virtual("punching_press", ("[mechanism.forces.punch]", second))
+    record = gather(model, model.simulate(cycles=1, transient=0))
+    test_no_words_of_the_mechanism_overlap((model, record.solution), 250.0)
 
 
 def test_a_ball_in_a_spall_is_no_applied_load(make_virtual: Callable[..., Model]) -> None:

@@ -147,7 +147,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
         value, error = accuracy.values[name], accuracy.estimates[name]
         # no more digits than the error allows
         digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1
-        rows.append((name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit))
+        rows.append((name, f"{factor * value:z.{digits}g}", f"{rounded(100 * error, 2)} %", unit))
     right = ("value", "estimated error")
     return ReportTable(
         title="Extremes between samples included",

@@ -14,6 +14,7 @@ from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
@@ -69,7 +70,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
         return words
     # what a reader wants first; channels that are all but nothing may change by more
     names.sort(key=lambda n: (not n.endswith("ball.force"), row_place(model.manifest, n) is None, -found.changes[n]))
-    first = ", ".join(f"{name} by {100.0 * found.changes[name]:.2g} %" for name in names[:SHOWN])
+    first = ", ".join(f"{name} by {rounded(100.0 * found.changes[name], 2)} %" for name in names[:SHOWN])
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return [
         f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "

@@ -159,7 +159,7 @@ class FitAnswer(ShortRepr, Reported):
             said.append(one.words)
             if one.combination:
                 said.append(
-                    f"Determined is {one.combination} = {one.value:.6g} in SI, ± {100.0 * one.deviation:.2g} %."
+                    f"Determined is {one.combination} = {one.value:.6g} in SI, ± {rounded(100.0 * one.deviation, 2)} %."
                 )
         said += [
             f"Differences of {one.name}: {one.noise:.3g} of their deviations, or of values without one"

@@ -22,6 +22,7 @@ from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
 
 #: Two rates are commensurable where a fraction with at most this denominator meets their ratio so closely [1].
@@ -116,7 +117,7 @@ def forcing_period(
             return found
     raise RequestError(
         f"steady: no period was found: after {float(count):g} turns of {base} the accelerations at one state differ by "
-        f"{100.0 * found.difference:.2g} %. Give the period yourself: turns."
+        f"{rounded(100.0 * found.difference, 2)} %. Give the period yourself: turns."
     )
 
 

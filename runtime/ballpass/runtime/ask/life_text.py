@@ -135,8 +135,8 @@ class LifeReport(Reported):
 def _turns_words(state: StateStrength) -> str:
     run = "The run" if state.turns is None else f"{state.turns:.4g} steady turns"
     if state.settled:
-        return f"{run}, settled: the second half moved lives and peaks by at most {100.0 * state.change:.2g} %."
-    return f"{run}, not settled: the second half moved a life or a peak by {100.0 * state.change:.2g} %."
+        return f"{run}, settled: the second half moved lives and peaks by at most {rounded(100.0 * state.change, 2)} %."
+    return f"{run}, not settled: the second half moved a life or a peak by {rounded(100.0 * state.change, 2)} %."
 
 
 def _state_parts(state: StateStrength) -> _Parts:

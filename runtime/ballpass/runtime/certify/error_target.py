@@ -30,6 +30,7 @@ from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.run.request import Request
@@ -237,9 +238,9 @@ def _relative(one: EvaluatedQuantities, other: EvaluatedQuantities, least: float
 def _chaos(found: Accuracy) -> str:
     return (
         f"An error of {100 * found.target:g} % on {', '.join(found.of)} cannot be kept here: the motion is chaotic. A "
-        f"start moved by {MOVED:g} m, or another tolerance, changes what is asked for by {100 * found.estimate:.2g} % "
-        "within the run, and no tolerance mends that. Only statistics mean something: take many turns or many starts "
-        "(simulate_many), or ask for a shorter run."
+        f"start moved by {MOVED:g} m, or another tolerance, changes what is asked for by "
+        f"{rounded(100 * found.estimate, 2)} % within the run, and no tolerance mends that. Only "
+        "statistics mean something: take many turns or many starts (simulate_many), or ask for a shorter run."
     )
 
 
@@ -249,7 +250,7 @@ def _refusal(target: float, names: tuple[str, ...], best: Accuracy | None, fault
         why = f" The last one said: {fault}" if fault is not None else ""
         return f"{asked}: no method could integrate this run. Check initial state, damping and parameters.{why}"
     return (
-        f"{asked}. The best is {100 * best.estimate:.2g} %, by {best.method} at rtol {best.rtol:g}. Where tightening "
-        "does not help, the motion amplifies small errors, or the quantity is nearly zero: ask for a shorter run, "
-        "for a larger error, or for another quantity."
+        f"{asked}. The best is {rounded(100 * best.estimate, 2)} %, by {best.method} at rtol {best.rtol:g}. Where "
+        "tightening does not help, the motion amplifies small errors, or the quantity is nearly zero: "
+        "ask for a shorter run, for a larger error, or for another quantity."
     )

@@ -30,6 +30,7 @@ from ballpass.runtime.quantity.grammar import channels_of, parse_quantity, quant
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.quantity.registry import KINDS as KINDS_OF_QUANTITIES
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.locating import LOCATED, choose_kinks
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import Request
@@ -116,8 +117,8 @@ class Growth(ShortRepr):
         if not self.uncertain and self.parted > PARTED:
             return (
                 f"the motion amplifies small errors: from a start moved by {self.moved:g} of the motion the states are "
-                f"{100.0 * self.parted:.2g} % of it apart at the end of the run. Extremes and rms keep their digits, "
-                "samples of the motion do not: another tolerance gives other ones."
+                f"{rounded(100.0 * self.parted, 2)} % of it apart at the end of the run. Extremes and rms keep their "
+                "digits, samples of the motion do not: another tolerance gives other ones."
             )
         if not self.uncertain:
             return ""
@@ -132,7 +133,7 @@ class Growth(ShortRepr):
 def largest_first(changes: Mapping[str, float]) -> str:
     """Channels by their changes, with that of the first, as "inner.vx by 3 %, and less inner.x, inner.y"."""
     worst, *others = sorted(changes, key=lambda name: -changes[name])
-    return f"{worst} by {100.0 * changes[worst]:.2g} %" + (f", and less {', '.join(others)}" if others else "")
+    return f"{worst} by {rounded(100.0 * changes[worst], 2)} %" + (f", and less {', '.join(others)}" if others else "")
 
 
 def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, spread: bool = True) -> Growth:
@@ -206,9 +207,9 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
         worst = max(found.uncertain, key=lambda name: found.changes[name])
         raise SimulationError(
             f"Derivatives of {', '.join(quantities)} mean nothing here: the motion is chaotic. A start moved by "
-            f"{TINY:g} of the motion changes {worst} by {100.0 * found.changes[worst]:.2g} % within the run, a growth "
-            f"by {found.changes[worst] / TINY:.1g}. Ask for fewer turns (--cycles), another clearance or damping, or "
-            "compare ensembles (simulate_many, ballpass sweep)."
+            f"{TINY:g} of the motion changes {worst} by {rounded(100.0 * found.changes[worst], 2)} % within the run, "
+            f"a growth by {found.changes[worst] / TINY:.1g}. Ask for fewer turns (--cycles), another clearance or "
+            "damping, or compare ensembles (simulate_many, ballpass sweep)."
         )
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
 from ballpass.runtime.certify.method_choice import MethodChoice
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.locating import LOCATED
@@ -175,7 +176,7 @@ def percent(error: float) -> str:
     if not math.isfinite(error):
         return "no result"
     value = 100.0 * error
-    return f"{value:.2g} %" if value < 100.0 else f"{value:.0f} %"
+    return f"{rounded(value, 2)} %" if value < 100.0 else f"{value:.0f} %"
 
 
 def milliseconds(seconds: float) -> str:

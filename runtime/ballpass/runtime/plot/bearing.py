@@ -20,7 +20,7 @@ from ballpass.runtime.plot.shapes import exaggeration
 from ballpass.runtime.plot.style import INK, SIGNAL, arrow, write
 
 #: White for unloaded, dark for the highest load: the order survives greyscale.
-LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))
+LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#b4c6df", "#4a6fa5", "#0d1b33"))
 
 RING = "#ced4da"
 
@@ -66,13 +66,15 @@ def draw_bearing(axes: Axes, record: Record, sample: int, samples: Sequence[int]
         contrast = "black" if bright else "white"
         write(axes, centre, str(number), fontsize=8.5, color=contrast, zorder=4)
         if load > 0.02 * highest:
-            place = (outer_raceway + wall + 0.42 * ball) * direction + outer
-            write(axes, place, _newton(load), fontsize=8, color="#212529")
+            # beside the ring, above or below it: the text begins, ends or has its middle there
+            side = "center" if abs(direction[0]) < 0.5 else "left" if direction[0] > 0.0 else "right"
+            place = (outer_raceway + wall + (0.42 if side == "center" else 0.12) * ball) * direction + outer
+            write(axes, place, f"{load:.0f} N", fontsize=8, color="#212529", ha=side)
     _draw_load(axes, record, sample, shown, inner, 0.92 * (inner_raceway - wall))
     reach = outer_raceway + wall + 0.85 * ball
     factor_words = f"clearance and displacement between the rings ×{factor:g}"
     write(axes, np.array([0.0, -1.04 * reach]), factor_words, fontsize=8, color="#495057", va="top")
-    axes.set_xlim(-reach, reach)
+    axes.set_xlim(-1.1 * reach, 1.1 * reach)
     axes.set_ylim(-1.12 * reach, reach)
     axes.set_aspect("equal")
     axes.axis("off")
@@ -103,8 +105,4 @@ def _draw_load(axes: Axes, record: Record, sample: int, shown: list[int], centre
     normal = np.array([load[1], -load[0]]) / size
     normal = normal if normal[0] > 0.0 else -normal
     place = centre + (0.54 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.04) * length * normal
-    write(axes, place, f"load\n{_newton(size)}", fontsize=8, color=SIGNAL, fontweight="bold")
-
-
-def _newton(value: float) -> str:
-    return f"{value:.0f} N" if value < 9999.5 else f"{value / 1e3:.3g} kN"
+    write(axes, place, f"load\n{size:.0f} N", fontsize=8, color=SIGNAL, fontweight="bold")

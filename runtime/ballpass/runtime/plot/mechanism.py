@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from matplotlib.patches import Circle, Polygon
 from ballpass.runtime.plot.record import FRAME, Array, Record
 from ballpass.runtime.plot.shapes import Points, coupler_points, drawn_forces, guide_direction, links, used_points
 from ballpass.runtime.plot.style import APPLIED, GREY, INK, SIGNAL, TORQUE, arrow, write
+from ballpass.runtime.report.numbers import rounded
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72
@@ -169,7 +171,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
         for k in range(3):
             words.avoid(arc[13 * k], arc[13 * k + 13], 0.05)
         side = [_COMPASS[k] for k in ((4, 3, 5) if seen.left else (0, 1, 7))]  # of a movie always the same
-        words.put(at, f"drive\n{abs(torque):.3g} N·m", 1.2 * _ARC * size, side, fontsize=9.5, color=TORQUE)
+        words.put(at, f"drive\n{rounded(abs(torque), 3)} N·m", 1.2 * _ARC * size, side, fontsize=9.5, color=TORQUE)
     _put_names(words, record, now, size)
     axes.set_xlim(seen.low[0], seen.high[0])
     axes.set_ylim(seen.low[1], seen.high[1])
@@ -190,7 +192,8 @@ class _Words:
     def avoid(self, one: Array, other: Array, weight: float = 0.2) -> None:
         """Keep texts off the line between two places."""
         half = np.full(2, 3.0 * self._point)
-        self._full += [(place, half, weight) for place in np.linspace(one, other, 9)]
+        count = max(9, int(np.ceil(np.max(np.abs(other - one)) / half[0])))
+        self._full += [(place, half, weight) for place in np.linspace(one, other, count)]
 
     def put(
         self,
@@ -199,24 +202,25 @@ class _Words:
         gap: float,
         ways: Sequence[Array] = _COMPASS,
         *,
+        places: int = 4,
         fontsize: float,
         color: str = "#212529",
     ) -> None:
-        """Write beside a place, in one of these directions, at a distance."""
+        """Write beside a place, in one of these directions, at a distance or, where that is covered, further."""
         lines = words.splitlines()
         half = 0.5 * fontsize * self._point * np.array([0.68 * max(map(len, lines)), 1.3 * len(lines)])
 
-        def place(way: Array) -> Array:
-            return np.asarray(at + gap * way + np.sign(np.round(way, 6)) * half)
+        def place(way: Array, further: int) -> Array:
+            return np.asarray(at + (gap + further * fontsize * self._point) * way + np.sign(np.round(way, 6)) * half)
 
-        def cost(way: Array) -> float:
-            middle = place(way)
+        def cost(way: Array, further: int) -> float:
+            middle = place(way, further)
             inside = np.all(middle - half > self._seen.low) and np.all(middle + half < self._seen.high)
             covered = (w for centre, room, w in self._full if np.all(np.abs(middle - centre) < half + room))
-            return sum(covered, 0.0 if inside else 10.0)
+            return sum(covered, (0.0 if inside else 10.0) + 0.1 * further)
 
-        best = place(min(ways, key=cost))  # the first of equals
-        self._full.append((best, half, 3.0))
+        best = place(*min(product(ways, range(places)), key=lambda one: cost(*one)))
+        self._full.append((best, half, 20.0))  # words over words: worse than outside of the view
         write(self._axes, best, words, fontsize=fontsize, fontweight="bold", color=color, zorder=8)
 
 
@@ -300,7 +304,7 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
     blocks = [now[item[4], item[5]] for item in record.mechanism.joints if item[1] == "prismatic"]
     for at, names in places:
         block = any(np.hypot(*(place - at)) < 0.01 * size for place in blocks)
-        words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, fontsize=10)
+        words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, places=1, fontsize=10)
 
 
 def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:

@@ -13,7 +13,19 @@ from matplotlib.ticker import StrMethodFormatter
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 from ballpass.runtime.plot.record import Array, Record
-from ballpass.runtime.plot.style import FIRST, GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
+from ballpass.runtime.plot.style import (
+    APPLIED,
+    FAINT,
+    FIRST,
+    GREY,
+    INK,
+    SAND,
+    SIGNAL,
+    frame,
+    legend_above,
+    new_figure,
+    styled,
+)
 
 #: Points drawn between two samples where velocities are known: a resonance has only ten samples a period.
 _FINER = 8
@@ -93,7 +105,7 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis, relative=relative)[1] for axis in "xy")
         # wide, to be seen where the last turn covers it
-        axes.plot(x, y, color=SAND, linestyle="-", linewidth=2.4, label="steady turns before it")
+        axes.plot(x, y, color=FAINT, linestyle="-", linewidth=2.4, label="steady turns before it")
     (t, x, _), (_, y, _) = (_path(record, last, axis, relative=relative) for axis in "xy")
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linestyle="-", linewidth=1.1, label=name if record.turns else "path")
@@ -136,7 +148,7 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
     label = "an applied load acts"
     for start, end in record.load_windows():
         inside = (angle - start) % (2.0 * np.pi) < end - start
-        look: dict[str, Any] = {"color": SIGNAL, "linestyle": "-", "linewidth": 1.9}
+        look: dict[str, Any] = {"color": APPLIED, "linestyle": "-", "linewidth": 1.9}
         axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), label=label, **look)
         label = "_nolegend_"
 

@@ -137,11 +137,14 @@ class Record:
     def load_windows(self) -> tuple[tuple[float, float], ...]:
         """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].
 
-        A load that acts all the turn has none, and none whose table takes several turns.
+        A load that acts all the turn has none, and none whose table takes several turns; nor have loads of which some
+        act at any angle.
         """
         full = 2.0 * np.pi
         edges = [(self.parameter(start), self.parameter(end)) for start, end in self.load_window_edges()]
-        return tuple((first % full, first % full + (end - first) % full) for first, end in edges)
+        found = tuple((first % full, first % full + (end - first) % full) for first, end in edges)
+        ends_alone = (end for _, end in found if not any((end - a) % full < b - a - 1e-9 for a, b in found))
+        return () if found and next(ends_alone, None) is None else found
 
     def load_window_edges(self) -> list[tuple[str, str]]:
         """Parameters at which these windows start and end; of a table over the angle, where it is not zero."""

@@ -276,10 +276,13 @@ function drawnOf(run) {
   const rows = chosen.map((k) => run.rows[k]), shift = 360 * Math.floor(Math.min(...chosen.map((k) => angles[k])) / TURN + 1e-9);
   const fresh = { ...numbers, turning, peak: chosen.indexOf(peak), time: { decimals: 7, all: rows.map((one) => one[0]) } };
   fresh.angle = numbers.angle && { decimals: 3, all: chosen.map((k) => angles[k] / DEGREE - shift) };
-  fresh.windows = turning ? solver.windows.map((edges) => edges.map((place) => run.known[place] / DEGREE)).map(([from, to]) => {
+  const acting = turning ? solver.windows.map((edges) => edges.map((place) => run.known[place] / DEGREE)).map(([from, to]) => {
     const first = ((from % 360) + 360) % 360;
     return [first, first + (((to - from) % 360) + 360) % 360];
   }) : [];
+  // as in `Record.load_windows`: of loads of which some act at any angle nothing is shaded
+  const within = (place) => acting.some(([from, to]) => (((place - from) % 360) + 360) % 360 < to - from - 1e-7);
+  fresh.windows = acting.every(([, to]) => within(to)) ? [] : acting;
   fresh.torque = solver.torque === null ? null : signalOf(rows.map((one) => one[solver.torque]));
   if (solver.linkage) {
     const paths = solver.linkage.points.map((point) => [0, 1].map((axis) => rows.map((one) => one[pointsAt + 2 * point + axis])));

@@ -34,8 +34,9 @@ SIGNAL = "#d1495b"
 SAND = "#edae49"
 PALE = "#dfe3e8"
 GREY = "#6c757d"
+FAINT = "#b4bcc4"
 
-#: What is drawn of a mechanism has one colour in figures and pages: reactions `SIGNAL`, and these.
+#: What is drawn of a machine has one colour in figures and pages: reactions and loads of bearings `SIGNAL`, and these.
 APPLIED = "#b87503"
 TORQUE = "#3c7a5e"
 

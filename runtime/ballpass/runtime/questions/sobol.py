@@ -186,8 +186,9 @@ class SobolAnswer(ShortRepr, Reported):
         if self.failed:
             low, high = wilson(self.failed, self.members)
             warned.append(
-                f"{self.failed} of {self.members} members have no result ({100.0 * low:.2g} to {100.0 * high:.2g} %). "
-                "They were left out with those that they are compared with: all numbers are of inputs that can be "
+                f"{self.failed} of {self.members} members have no result "
+                f"({rounded(100.0 * low, 2)} to {rounded(100.0 * high, 2)} %). They were left out with "
+                "those that they are compared with: all numbers are of inputs that can be "
                 f"simulated. The first: {self.fault}"
             )
         facts = {

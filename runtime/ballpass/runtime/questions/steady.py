@@ -15,6 +15,7 @@ from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.report.short_words import short_words
@@ -220,7 +221,7 @@ class SteadyState(ShortRepr, Reported):
         if self.difference > SAME:
             warnings.append(
                 f"{self.turns:g} turns are no period of this machine: at one state the accelerations at both ends "
-                f"differ by {100.0 * self.difference:.2g} %. Loads or balls are elsewhere. Leave turns away."
+                f"differ by {rounded(100.0 * self.difference, 2)} %. Loads or balls are elsewhere. Leave turns away."
             )
         facts = {
             "period": self.period,

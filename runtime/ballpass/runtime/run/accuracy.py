@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ballpass.runtime.contract.json_text import finite
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.show.short import ShortRepr
 
 
@@ -57,7 +58,7 @@ class Accuracy(ShortRepr):
         worst = max(self.estimates, key=lambda name: self.estimates[name])
         after = f", after {len(self.tried)} other ways" if self.tried else ""
         return (
-            f"error asked for {100 * self.target:g} %, estimated {100 * self.estimate:.2g} % (worst: "
+            f"error asked for {100 * self.target:g} %, estimated {rounded(100 * self.estimate, 2)} % (worst: "
             f"{worst}) by {self.method} at rtol {self.rtol:g}, against a second whole run: "
             f"{self.check}. Integrated in {1e3 * self.time:.3g} ms; {1e3 * self.check_time:.3g} ms more went into the "
             f"estimate{after}."

@@ -23,6 +23,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
@@ -84,7 +85,7 @@ class Settled(ShortRepr):
         behind = f" behind {self.dropped} of transient" if self.dropped else ""
         return (
             f"peaks and rms {state} over {self.turns} steady turns{behind}: the second half changed extremes and rms "
-            f"most in {called(name)}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
+            f"most in {called(name)}, by {rounded(100.0 * peak, 2)} % of its range and {rounded(100.0 * mean, 2)} %"
         )
 
 
