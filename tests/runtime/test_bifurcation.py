@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import _thread
 import math
+import time
 from collections.abc import Callable
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -82,6 +85,44 @@ def test_the_interval_of_batch_means_holds_the_mean_of_a_correlated_series_as_of
         hits += found.low < 0.2 < found.high
     assert 0.90 < hits / 400 < 0.99
     assert student.ppf(0.975, 9) == pytest.approx(2.262, abs=1e-3)  # ten batches: printed tables
+
+
+def test_growth_that_follows_the_place_of_the_balls_is_no_scatter_of_the_exponent() -> None:
+    """Of the press at 40 um, read once a turn: a wave of 3.9 that drifts by 0.0522 of a ball pitch, noise of 2.7."""
+    draw, drift, hits, too_wide = np.random.default_rng(2), 409.0 * 8.0 / 1072.0 % 1.0, 0, 0
+    for _ in range(400):
+        wave = 3.9 * np.cos(math.tau * (drift * np.arange(60) + draw.random()))
+        series = 4.2 + wave + 2.7 * draw.normal(size=60)
+        found, plain = exponent_of(series, [drift]), exponent_of(series)
+        hits += found.low < 4.2 < found.high
+        too_wide += plain.low < 4.2 < plain.high
+    assert 0.90 < hits / 400 < 0.99
+    assert too_wide == 400
+
+
+@pytest.mark.long
+@pytest.mark.extreme
+def test_intervals_of_fifty_runs_of_the_chaotic_press_hold_the_exponent_as_often_as_they_say(
+    make_model: Callable[..., Model],
+) -> None:
+    press, found = make_model("punching_press_tangent"), []
+    for k in range(5):  # chaos makes runs of all but equal clearances independent
+        vary = f"bearing.clearance={40.0 + 1e-4 * k} um:{40.00005 + 1e-4 * k} um:5"
+        motions = press.bifurcation(vary, progress=False)
+        found += [one.exponent for one in (*motions.up, *motions.down) if one.exponent is not None]
+    mean = np.mean([one.mean for one in found])
+    hits = sum(one.low < mean < one.high for one in found)
+    assert len(found) == 50
+    assert 0.90 <= hits / 50 <= 0.99
+    assert mean == pytest.approx(4.2, abs=0.2)
+
+
+def test_an_interrupt_ends_both_directions(rotor: Model) -> None:
+    timer, begun = Timer(1.0, _thread.interrupt_main), time.perf_counter()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        rotor.bifurcation("shaft.speed=300 rpm:400 rpm:9", readings=100_000, settling=200_000, exponent=False)
+    assert time.perf_counter() - begun < 10.0
 
 
 def test_kinds_of_motion_of_maps_that_are_known() -> None:

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from ballpass.runtime.ask.kept_parts import Arrays
 from ballpass.runtime.ask.shooting import Shooting
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.parameters import Numbers
@@ -122,8 +124,9 @@ def contact_sequence(shooting: Shooting, nodes: np.ndarray, value: float | None)
     bearings, stops = model.manifest.bearings, model.manifest.stops
     channels = ChannelValues(model, [*(bearing.prefix + DEFLECTION for bearing in bearings), *stops])
     t, parts = [np.zeros(0)], []
-    for k, start in enumerate(nodes):
-        times, found = _deflections(shooting, numbers, channels, start, (k, len(nodes)), length)
+    for k in range(len(nodes)):
+        compute = partial(_deflections, shooting, numbers, channels, nodes[k], (k, len(nodes)), length)
+        times, *found = shooting.once(f"contacts {k}", nodes, value, shooting.rtol, compute)
         first = 1 if k else 0  # the state where a segment ends is the one where the next begins
         t.append(times[first:])
         parts.append([table[first:] for table in found])
@@ -151,7 +154,7 @@ def _deflections(
     start: np.ndarray,
     part: tuple[int, int],
     length: float,
-) -> tuple[np.ndarray, list[np.ndarray]]:
+) -> Arrays:
     """Times within and at the ends of the steps of a segment, and deflections there, a table for each channel."""
     model = shooting.model
     states = tuple(info.name for info in model.manifest.states)
@@ -171,7 +174,7 @@ def _deflections(
     segments = segments_of(run)
     held = np.clip(np.searchsorted(segments.times, t) - 1, 0, len(segments.inputs) - 1)
     seen = channels.along(follow(run, segments, make_edges(run, segments, None), fixed_nodes(t, held, held)), numbers)
-    return t, [seen[name].value for name in channels.channels]
+    return t, *(seen[name].value for name in channels.channels)
 
 
 def _shifts(model: LoadedModel, numbers: Numbers, state: np.ndarray, length: float) -> list[int]:

@@ -153,19 +153,27 @@ def common_period(
     )
 
 
-def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
-    """What else turns than a bearing's cage and stands elsewhere after each time `every` [s], by its rate.
+def phase_drifts(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float
+) -> dict[str, float]:
+    """What stands elsewhere after each time `every` [s], by its rate: the part of a turn, of a cage the part of a ball
+    pitch, beyond whole ones.
 
     Parameters
     ----------
     times, states : as for `forcing_period`
     """
-    found = []
-    for rate in _rates(model, numbers, times, states):
-        turns = abs(numbers.values[rate]) * every / driver_angle.TURN
-        if _alike(model, rate) == 1 and abs(turns - round(turns)) > EXACT * turns:
-            found.append(rate)
+    found = {}
+    for rate, alike in _rates(model, numbers, times, states).items():
+        rounds = abs(numbers.values[rate]) * alike * every / driver_angle.TURN
+        if abs(rounds - round(rounds)) > EXACT * rounds:
+            found[rate] = rounds % 1.0
     return found
+
+
+def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
+    """What else turns than a bearing's cage and stands elsewhere after each time, as for `phase_drifts`."""
+    return [rate for rate in phase_drifts(model, numbers, times, states, every) if _alike(model, rate) == 1]
 
 
 def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
@@ -253,6 +261,6 @@ def _two_periods(base: str, name: str, ratio: float) -> str:
     return (
         f"steady: {name} turns {ratio:.12g} times as fast as {base}, which is no fraction with a denominator up to "
         f"{LARGEST_DENOMINATOR}: the motion has two periods, and no state repeats. Near: {near}. Change a diameter so "
-        "that it is one, give the period that is near enough: turns; or take statistics: ballpass run --turns settle, "
-        "or the stroboscopic values of ballpass bifurcation."
+        "that it is one, or give the period that is near enough: turns. The closed curve on which the states lie: "
+        "ballpass section; statistics: ballpass run --turns settle; stroboscopic values: ballpass bifurcation."
     )

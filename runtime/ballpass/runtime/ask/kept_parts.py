@@ -37,16 +37,17 @@ class KeptParts:
     def __init__(self, folder: Path | None, decides: tuple[Any, ...]) -> None:
         self._folder, self._digest = folder, _digest(decides)
 
-    def once(self, key: np.ndarray, compute: Callable[[], Arrays]) -> Arrays:
+    def once(self, key: np.ndarray, compute: Callable[[], Arrays], what: str = "") -> Arrays:
         """Arrays of a part, from its file where there is one.
 
         Parameters
         ----------
         key : what decides this part beside that of all
+        what : name of the part, where there are several of one key
         """
         if self._folder is None:
             return compute()
-        path = self._folder / f"{_digest((self._digest, key))}.npz"
+        path = self._folder / f"{_digest((self._digest, what, key))}.npz"
         try:
             with np.load(io.BytesIO(path.read_bytes())) as stored:
                 return tuple(stored[f"arr_{k}"] for k in range(len(stored.files)))

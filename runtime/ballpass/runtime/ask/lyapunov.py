@@ -8,6 +8,7 @@ repels and nothing sinks into rounding in one that attracts.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +58,26 @@ class Exponent:
         return self.mean + self.half
 
 
-def exponent_of(growth: np.ndarray) -> Exponent:
-    """Mean of the growth at each reading, and its interval by batch means: readings in a row are not independent."""
-    batches = np.array([batch.mean() for batch in np.array_split(growth, BATCHES)])
-    half = student.ppf(0.5 + CONFIDENCE / 2.0, BATCHES - 1) * batches.std(ddof=1) / np.sqrt(BATCHES)
-    return Exponent(mean=float(growth.mean()), half=float(half))
+def exponent_of(growth: np.ndarray, drifts: Collection[float] = ()) -> Exponent:
+    """Mean of the growth at each reading, and its interval by batch means: readings in a row are not independent.
+
+    Parameters
+    ----------
+    growth : shape (readings,)
+    drifts : parts of a round by which phases of the equations move from reading to reading: growth follows them, and is
+        no scatter as far as one harmonic of each describes it
+    """
+    readings = np.arange(len(growth))
+    # a phase that has not been everywhere is not known from the mean
+    around = [drift for drift in drifts if min(drift, 1.0 - drift) * len(growth) >= 1.0]
+    angles = 2.0 * np.pi * np.multiply.outer(readings, around)
+    waves = np.column_stack([np.ones(len(growth)), np.cos(angles), np.sin(angles)])
+    mean, *heights = np.linalg.lstsq(waves, growth)[0]
+    left = growth - waves[:, 1:] @ np.array(heights)
+    batches = np.array([batch.mean() for batch in np.array_split(left, BATCHES)])
+    spread = batches.std(ddof=1) / np.sqrt(1.0 - len(heights) / len(growth))
+    half = student.ppf(0.5 + CONFIDENCE / 2.0, BATCHES - 1) * spread / np.sqrt(BATCHES)
+    return Exponent(mean=float(mean), half=float(half))
 
 
 def strobe_with_tangent(
@@ -72,8 +88,13 @@ def strobe_with_tangent(
     readings: int,
     magnitude: np.ndarray,
     rtol: float,
+    each: Callable[[], None],
 ) -> tuple[np.ndarray, np.ndarray]:
     """States after each time step, shape (readings, states), and growth of a disturbance in each, shape (readings,).
+
+    Parameters
+    ----------
+    each : called at each reading
 
     Raises
     ------
@@ -84,6 +105,7 @@ def strobe_with_tangent(
     direction = np.ones(len(names)) / np.sqrt(len(names))
     states, growth = np.empty((readings, len(names))), np.empty(readings)
     for k in range(-ALIGN, readings):
+        each()
         request = Request(duration=step, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol)
         found = sensitivities(model, numbers, request, names)
         grown = (found.x[-1] @ (direction * magnitude)) / magnitude

@@ -10,12 +10,13 @@ its neighbourhood within a period.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ballpass.runtime.ask.forcing_period import ForcingPeriod
+from ballpass.runtime.ask.kept_parts import Arrays, KeptParts
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
@@ -99,6 +100,7 @@ class Shooting:
     magnitude : of each state, shape (states,)
     rtol : of the runs; None: that of derivatives
     over : parameter that varies, "" for none
+    parts : keeps what is computed
     """
 
     model: LoadedModel
@@ -108,7 +110,8 @@ class Shooting:
     segments: int
     magnitude: np.ndarray
     rtol: float | None
-    over: str = ""
+    over: str
+    parts: KeptParts
 
     def numbers(self, value: float | None) -> Numbers:
         """Numbers of the model with this value of the varied parameter."""
@@ -123,6 +126,19 @@ class Shooting:
         IntegrationError
             A run failed.
         """
+        tight = self.rtol if rtol is None else rtol
+        found = self.once("residual", nodes, value, tight, lambda: self._residual(nodes, value, tight))
+        return Residual(left=found[0], by_states=found[1], by_parameter=found[2], monodromy=found[3])
+
+    def once(
+        self, what: str, nodes: np.ndarray, value: float | None, rtol: float | None, compute: Callable[[], Arrays]
+    ) -> Arrays:
+        """Arrays of these states, kept where the call keeps what it computes."""
+        given = (value, rtol, self.repeats, self.segments)
+        key = np.array([*nodes.ravel(), *(np.nan if number is None else number for number in given)])
+        return self.parts.once(key, compute, what)
+
+    def _residual(self, nodes: np.ndarray, value: float | None, rtol: float | None) -> Arrays:
         model, count = self.model, nodes.shape[1]
         numbers = self.numbers(value)
         length = self.repeats * self.period.time(numbers.values)
@@ -136,7 +152,7 @@ class Shooting:
         by_states = np.zeros((self.segments, count, self.segments, count))
         monodromy = np.eye(count)
         for k in range(self.segments):
-            request = self._request(nodes, k, numbers, self.rtol if rtol is None else rtol)
+            request = self._request(nodes, k, numbers, rtol)
             found = sensitivities(model, numbers, request, names, with_jumps=True)
             end, slopes = found.solution.x[-1], found.x[-1]
             flow, nxt = slopes[:, :count], (k + 1) % self.segments
@@ -153,13 +169,7 @@ class Shooting:
                 moved = slopes[:, count] + rates[1] * shift[1] - flow @ rates[0] * shift[0]
                 by_parameter[k] = moved / self.magnitude
             monodromy = flow @ monodromy
-        size = nodes.size
-        return Residual(
-            left=left.ravel(),
-            by_states=by_states.reshape(size, size),
-            by_parameter=by_parameter.ravel(),
-            monodromy=monodromy,
-        )
+        return left.ravel(), by_states.reshape(nodes.size, nodes.size), by_parameter.ravel(), monodromy
 
     def change(self, nodes: np.ndarray, value: float | None = None) -> float:
         """Largest of what a period leaves from these states, by runs without derivatives.

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
+from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -25,6 +28,7 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ballpass.runtime.ask.kept_parts import Arrays
     from ballpass.runtime.ask.lyapunov import Exponent
     from ballpass.runtime.ask.parameter_range import ParameterRange
 
@@ -33,6 +37,9 @@ LONGEST_STROBE = 8.0
 
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
+
+#: Longest delay of an interrupt [s].
+PATIENCE = 0.2
 
 #: Moments at which the equations are compared.
 MOMENTS = 40
@@ -189,6 +196,7 @@ def bifurcation(
     exponent: WithExponent = True,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
+    keep: str | Path | None = None,
     progress: Progress = None,
 ) -> Bifurcation:
     """Separate periodic from chaotic motion over a parameter, upwards and downwards.
@@ -200,6 +208,7 @@ def bifurcation(
     Parameters
     ----------
     parameters : overrides, SI
+    keep : folder for what is computed, by which a call that was killed continues; deleted at the end
     progress : as for `simulate`
 
     Raises
@@ -219,6 +228,8 @@ def bifurcation(
     [True, True]
     """
     from ballpass.runtime.ask.forcing_period import refuse_free_driver
+    from ballpass.runtime.ask.kept_parts import kept_parts
+    from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.run.locating import refuse_jumps
 
@@ -231,24 +242,48 @@ def bifurcation(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
-    step_of, every, forced = _strobe(model, overrides, chosen)
-    with shown("following motions", progress) as tell:
-        done = [0]
+    strobe = _strobe(model, overrides, chosen)
+    stopped, done = Event(), [0]
+
+    def each() -> None:
+        if stopped.is_set():
+            raise KeyboardInterrupt
+
+    with (
+        kept_parts(keep, model, chosen, readings, settling, exponent, rtol, overrides) as parts,
+        shown("following motions", progress) as tell,
+        ThreadPoolExecutor(2) as pool,
+    ):
 
         def sweep(order: np.ndarray) -> tuple[MotionAt, ...]:
             found, start = [], None
             for value in order.tolist():
                 given = {**overrides, chosen.name: value}
-                motion = _motion(model, given, value, step_of, start, readings, settling, rtol, exponent, forced)
-                found.append(motion)
-                start = motion.states[-1]
+                step = strobe.step(given)
+                states, growth, magnitude = parts.once(
+                    np.array([value, *([] if start is None else start)]),
+                    partial(_motion, model, given, step, start, readings, settling, rtol, exponent, each),
+                )
+                grown = exponent_of(growth, strobe.drifts(given)) if exponent else None
+                kind = kind_of_motion(states, magnitude, grown, forced=strobe.forced)
+                found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind))
+                start = states[-1]
                 done[0] += 1
                 if tell is not None:
                     tell(done[0] / (2 * chosen.count))
             return tuple(found)
 
-        with ThreadPoolExecutor(2) as pool:
-            up, down = pool.map(sweep, (chosen.values, chosen.values[::-1]))
+        directions = [pool.submit(sweep, values) for values in (chosen.values, chosen.values[::-1])]
+        pending = set(directions)
+        try:
+            while pending:  # with a limit, so that an interrupt ends the wait on every system
+                finished, pending = wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED)
+                for one in finished:
+                    one.result()
+            up, down = (one.result() for one in directions)
+        except BaseException:
+            stopped.set()  # the pool waits for its threads
+            raise
     scale = np.max(np.abs(np.concatenate([motion.states for motion in up])), axis=0) + 1e-300
     apart = tuple(
         one.value
@@ -261,18 +296,33 @@ def bifurcation(
         state=state,
         unit=manifest.states[names.index(state)].unit,
         row=names.index(state),
-        every=every,
+        every=strobe.words,
         up=up,
         down=down,
         apart=apart,
     )
 
 
-def _strobe(
-    model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange
-) -> tuple[Callable[[Mapping[str, float]], float], str, bool]:
-    """Time between readings as a function of overrides, words for it, and whether it is a period of the equations."""
-    from ballpass.runtime.ask.forcing_period import common_period
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Strobe:
+    """When states are read.
+
+    Attributes
+    ----------
+    step : time between readings, of overrides [s]
+    words : for people
+    forced : whether that is a period of the equations
+    drifts : of overrides, the parts of a round by which phases of the equations move from reading to reading
+    """
+
+    step: Callable[[Mapping[str, float]], float]
+    words: str
+    forced: bool
+    drifts: Callable[[Mapping[str, float]], Collection[float]]
+
+
+def _strobe(model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange) -> _Strobe:
+    from ballpass.runtime.ask.forcing_period import common_period, phase_drifts
 
     first = {**parameters, vary.name: vary.low}
     turn = model.period(first)
@@ -281,31 +331,40 @@ def _strobe(
     run = model.simulate(
         duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=first, outputs=[], progress=False
     )
+
+    def drifts(given: Mapping[str, float]) -> Collection[float]:
+        try:
+            return phase_drifts(model, model.numbers(given), run.t, run.x, model.period(given)).values()
+        except RequestError:  # loads or speeds by a table over time have no phase
+            return ()
+
     try:
         period = common_period(model, parameters, vary, run.t, run.x)
     except RequestError:  # no common period: readings are taken each turn, and the report says so
         period = None
     if period is not None and period.time(model.numbers(first).values) <= LONGEST_STROBE * turn:
-        return (lambda given: period.time(model.numbers(given).values)), f"each time {period.words}", True
-    return model.period, "once a turn, after which balls or loads are elsewhere", False
+        words = f"each time {period.words}"
+        return _Strobe(
+            step=lambda given: period.time(model.numbers(given).values), words=words, forced=True, drifts=lambda _: ()
+        )
+    words = "once a turn, after which balls or loads are elsewhere"
+    return _Strobe(step=model.period, words=words, forced=False, drifts=drifts)
 
 
 def _motion(
     model: AnyModel,
     parameters: Mapping[str, float],
-    value: float,
-    step_of: Callable[[Mapping[str, float]], float],
+    step: float,
     start: np.ndarray | None,
     readings: int,
     settling: int,
     rtol: float | None,
     exponent: bool,
-    forced: bool,
-) -> MotionAt:
-    """The motion at one value, from a state on."""
-    from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, strobe_with_tangent
+    each: Callable[[], None],
+) -> Arrays:
+    """The motion from a state on: readings, growth at each, which is empty without an exponent, and magnitudes."""
+    from ballpass.runtime.ask.lyapunov import strobe_with_tangent
 
-    step = step_of(parameters)
     count = max(settling, 1) if exponent else settling + readings
     run = model.simulate(
         duration=count * step,
@@ -315,19 +374,13 @@ def _motion(
         rtol=SECTION_RTOL if rtol is None else rtol,
         outputs=[],
         transient=0.0,
-        progress=False,
+        progress=lambda _done: each(),
     )
-    magnitude, grown = np.array(run.statistics.magnitudes), None
-    states = run.x[settling:]
-    if exponent:
-        tight = EXPONENT_RTOL if rtol is None else rtol
-        states, growth = strobe_with_tangent(
-            model, model.numbers(parameters), run.end, step, readings, magnitude, tight
-        )
-        grown = exponent_of(growth)
-    return MotionAt(
-        value=value,
-        states=states,
-        exponent=grown,
-        kind=kind_of_motion(states, magnitude, grown, forced=forced),
+    magnitude = np.array(run.statistics.magnitudes)
+    if not exponent:
+        return run.x[settling:], np.zeros(0), magnitude
+    tight = EXPONENT_RTOL if rtol is None else rtol
+    return (
+        *strobe_with_tangent(model, model.numbers(parameters), run.end, step, readings, magnitude, tight, each),
+        magnitude,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -265,6 +266,7 @@ def steady(
     over: Over = None,
     parameters: Mapping[str, float] | None = None,
     rtol: TightRtol = None,
+    keep: str | Path | None = None,
     progress: Progress = None,
 ) -> SteadyState:
     """Find a periodic state by shooting, and say by its multipliers whether it is stable.
@@ -275,6 +277,7 @@ def steady(
     Parameters
     ----------
     parameters : overrides, SI
+    keep : folder for what is computed, by which a call that was killed continues; deleted at the end
     progress : as for `simulate`
 
     Raises
@@ -293,6 +296,7 @@ def steady(
     """
     from ballpass.runtime.ask.contact_sequence import contact_sequence
     from ballpass.runtime.ask.forcing_period import common_period, forcing_period, refuse_free_driver
+    from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
@@ -304,7 +308,7 @@ def steady(
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)
     turn = model.period(given)
-    with shown("shooting", progress) as tell:
+    with kept_parts(keep, model, given, ends, turns, transient) as parts, shown("shooting", progress) as tell:
         sampled = _transient(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
         pick = np.linspace(0, len(sampled.t) - 1, MOMENTS).astype(int)
         moments = sampled.t[pick], sampled.x[pick]
@@ -322,6 +326,7 @@ def steady(
             magnitude=np.array(sampled.statistics.magnitudes),
             rtol=BRANCH_RTOL if rtol is None and ends is not None else rtol,
             over=ends.name if ends else "",
+            parts=parts,
         )
         whole = math.floor(transient * turn / length + 1e-9) if math.isfinite(turn) else 0
         begin = _begin(model, given, whole * length)
@@ -331,6 +336,7 @@ def steady(
             kicked = _kicked(shooting, found)
             found, sooner = (found, sooner) if kicked is None else (kicked, _sooner(shooting, kicked))
         branches, notes = ((), ()) if ends is None else _branches(shooting, found, ends, tell)
+        contacts = contact_sequence(shooting, found.nodes, given[ends.name] if ends else None)
     return SteadyState(
         states=tuple(info.name for info in manifest.states),
         units=tuple(info.unit for info in manifest.states),
@@ -343,7 +349,7 @@ def steady(
         start=found.nodes[0],
         multipliers=found.multipliers,
         resolution=SENSITIVITY * sampled.statistics.rtol,
-        contacts=contact_sequence(shooting, found.nodes, given[ends.name] if ends else None),
+        contacts=contacts,
         left=found.left,
         segments=shooting.segments,
         integrated=found.periods,
