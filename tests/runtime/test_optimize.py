@@ -13,9 +13,10 @@ from ballpass.runtime import Model, QuantityFunction, RequestError
 from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes
 from ballpass.runtime.ask.interior_point import minimize_by_ipopt
 from ballpass.runtime.ask.limits import read_limits
+from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
 
 Search = Callable[[Callable[[np.ndarray], Plane], np.ndarray], BundleMinimum]
-searches = pytest.mark.parametrize("minimized", [minimize_by_planes, minimize_by_ipopt])
+searches = pytest.mark.parametrize("minimized", [minimize_by_planes, minimize_by_slsqp, minimize_by_ipopt])
 
 
 def _planes(*functions: Callable[[np.ndarray], tuple[float, np.ndarray]]) -> Callable[[np.ndarray], Plane]:
@@ -57,16 +58,17 @@ def test_a_smooth_minimum_on_a_constraint_has_the_multiplier_of_lagrange(minimiz
     assert found.multipliers == pytest.approx([0.8], abs=1e-2)
 
 
-def test_ipopt_takes_fewer_evaluations_in_a_curved_valley_of_four_variables() -> None:
+@pytest.mark.parametrize("minimized", [minimize_by_slsqp, minimize_by_ipopt])
+def test_smooth_searches_take_fewer_evaluations_in_a_curved_valley_of_four_variables(minimized: Search) -> None:
     """Rosenbrock's function, least 0 at (0.5, ...)."""
 
     def goal(x: np.ndarray) -> tuple[float, np.ndarray]:
         return float(rosen(2.0 * x)) / 10.0, rosen_der(2.0 * x) / 5.0
 
     start = np.array([0.05, 0.9, 0.3, 0.9])
-    ipopt, planes = (minimized(_planes(goal), start) for minimized in (minimize_by_ipopt, minimize_by_planes))
-    assert ipopt.best.values[0] < 0.1 * planes.best.values[0]
-    assert len(ipopt.trace) < len(planes.trace)
+    smooth, planes = (search(_planes(goal), start) for search in (minimized, minimize_by_planes))
+    assert smooth.best.values[0] < 0.1 * planes.best.values[0]
+    assert len(smooth.trace) < len(planes.trace)
 
 
 def test_what_ends_an_evaluation_ends_ipopt() -> None:
@@ -80,9 +82,9 @@ def test_what_ends_an_evaluation_ends_ipopt() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("search", ["planes", "ipopt"])
+@pytest.mark.parametrize("search", ["planes", "slsqp", "ipopt"])
 def test_the_least_peak_of_the_press_over_housing_damping_is_the_kink_of_an_independent_program(
-    make_model: Callable[..., Model], search: Literal["planes", "ipopt"]
+    make_model: Callable[..., Model], search: Literal["planes", "slsqp", "ipopt"]
 ) -> None:
     found = make_model("punching_press").optimize(
         "peak_ball_force",

@@ -71,10 +71,10 @@ Tolerance = Annotated[
     ),
 ]
 Search = Annotated[
-    Literal["planes", "ipopt"],
+    Literal["planes", "slsqp", "ipopt"],
     Option(
-        words="Tangent planes of several points at once; or IPOPT, for smooth goals of many parameters, and planes "
-        "from where it ends."
+        words="Tangent planes of several points at once; or SLSQP or IPOPT, for smooth goals of many parameters, and "
+        "planes from where it ends."
     ),
 ]
 Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
@@ -292,6 +292,7 @@ def optimize(
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
     from ballpass.runtime.certify.worst_values import WorstValues
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
@@ -308,7 +309,7 @@ def optimize(
     limits = read_limits(model.manifest, "subject_to", _texts(subject_to), model, parameters, varied)
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
     shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
-    minimized = minimize_by_ipopt if search == "ipopt" else minimize_by_planes
+    minimized = {"planes": minimize_by_planes, "slsqp": minimize_by_slsqp, "ipopt": minimize_by_ipopt}[search]
     with (
         kept_parts(keep, model, *worst.decides) as parts,
         shown("searching", progress) as tell,
