@@ -110,6 +110,17 @@ def test_an_axial_displacement_turns_the_contacts_as_the_centres_of_the_grooves_
     assert pushed.constants(touching)["bearing.radial_gap"] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_a_displacement_that_does_not_take_up_the_clearance_is_no_preload(pushed: Model) -> None:
+    """The free contact angle, cos = 1 - P_d/(2 A), is met at A sin of it.  Nothing said that less preloads nothing."""
+    clearance, apart = 20e-6, 0.05 * pushed.parameters["bearing.ball_diameter"]
+    taken_up = apart * math.sin(math.acos(1.0 - clearance / (2.0 * apart)))
+    for displacement, said in ((0.99 * taken_up, True), (1.01 * taken_up, False)):
+        numbers = {"bearing.clearance": clearance, "bearing.axial_displacement": displacement}
+        words = " ".join(pushed.explain(numbers).limits)
+        assert ("is not preloaded" in words) == said
+        assert (f"touch from {1e6 * taken_up:.3g} µm on" in words) == said
+
+
 def test_curvature_sums_and_pressures_follow_gamma(angled: Model) -> None:
     """Harris: D_w sum of rho = 4 - 1/f ± 2 gamma/(1 ∓ gamma), gamma with the cosine; C and Python alike."""
     numbers = {"bearing.contact_angle": math.radians(40.0)}

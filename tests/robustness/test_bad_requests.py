@@ -171,6 +171,7 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: m.explore(""), r"path: a path is expected, not '' \(str\)"),
     (lambda m: m.explore("x.html", units=5), r"units: a mapping from name to value is expected, not 5 \(int\)"),
     (lambda m: m.explore("x.html", units={"a": "m", "bearing.clearance": "N"}), r"(?s)no parameter 'a'.*clearance: "),
+    (lambda m: m.explore("x.html", units={"bearing.clearance": np.zeros((2, 2))}), r"units: bearing\.clearance: "),
     (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", starts=1.5), "starts: 1.5 is no whole number"),
     (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", starts=np.int64(-1)), "starts: -1 lies outside"),
     (lambda m: m.fit(5, "bearing.clearance=1um:3um"), r"data: a file .* or a mapping .* expected, not 5 \(int\)"),

@@ -335,7 +335,7 @@ def _constants(sol: Solution) -> dict[str, Any]:
     units = {info.name: info.unit for info in sol.manifest.constants}
     found: dict[str, Any] = {}
     for bearing in sol.manifest.bearings:
-        for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
+        for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio", "cos_contact_angle", "radial_gap"):
             name = f"{bearing.path}.{key}"
             if name in units:
                 found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])

@@ -60,7 +60,7 @@ def check_units(manifest: Manifest, units: Mapping[str, str]) -> None:
     for name, unit in units.items():
         if name not in own:
             faults.append(unknown_name("parameter", name, own))
-        elif unit != own[name]:
+        elif not isinstance(unit, str) or unit != own[name]:
             try:
                 parse_quantity(f"1 {unit}", own[name])
             except QuantityError as fault:

@@ -5,6 +5,7 @@ In: a manifest and values of its parameters and constants.  Out: sentences; none
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from ballpass.runtime.contract.manifest import Manifest
@@ -14,12 +15,21 @@ _BODY, _MASS = "mechanism.bodies.", ".mass"
 
 
 def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator[str]:
-    """Linkages that outweigh the ring of a bearing that is loaded one-way, forces that begin at once.
+    """Linkages that outweigh the ring of a bearing that is loaded one-way, forces that begin at once, lost preloads.
 
     Parameters
     ----------
     values : parameters and derived constants by name
     """
+    for bearing in manifest.bearings:
+        gap, apart = (values.get(f"{bearing.path}.{name}", 0.0) for name in ("radial_gap", "groove_centre_distance"))
+        if gap > 0.0:
+            enough = math.sqrt(apart**2 - (apart - 0.5 * values[f"{bearing.path}.clearance"]) ** 2)
+            yield (
+                f"{bearing.path} is not preloaded: the axial displacement of "
+                f"{1e6 * values[f'{bearing.path}.axial_displacement']:.3g} µm leaves a radial gap of {1e6 * gap:.3g} "
+                f"µm. Its balls touch from {1e6 * enough:.3g} µm on."
+            )
     mechanism = manifest.mechanism
     if mechanism is None:
         whole = [bearing.path for bearing in manifest.bearings if f"{bearing.path}.share" not in values]
