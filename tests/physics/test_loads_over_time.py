@@ -47,6 +47,18 @@ def test_no_answer_takes_turns_behind_the_table(worked: Model) -> None:
     assert warnings_of_transient(worked, {}, cycles=20, transient=2) == []
 
 
+def test_turns_of_a_scene_without_a_run_say_that_they_lie_behind_the_table(
+    worked: Model, make_model: Callable[..., Model], scene_text: Callable[..., str]
+) -> None:
+    text = scene_text("rotor")
+    bare = make_model("rotor", ("[bearing]\n", BURST + "[bearing]\n"), (text[text.index("[run]") :], ""))
+    earlier = {f"loads.work.time.{row}": time for row, time in ((2, 0.3), (3, 0.31), (4, 0.4))}
+    (said,) = warnings_of_transient(bare, earlier)
+    assert "begin at 1 s" in said
+    assert "rows up to 0.4 s" in said
+    assert warnings_of_transient(bare, earlier, cycles=60, transient=5) == warnings_of_transient(worked, {}) == []
+
+
 def test_turns_behind_the_last_row_are_alike(worked: Model) -> None:
     behind = math.ceil(LENGTH / worked.period()) + 10
     found = worked.settle(transient=behind)

@@ -15,6 +15,7 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
@@ -40,11 +41,30 @@ def warnings_of_transient(
     if not (model.has_stepper and model.states):
         return []
     request = Request(cycles=cycles, duration=duration, transient_cycles=transient)
+    asked = (cycles, duration, transient) != (None, None, None)
     try:
         run = resolve(model, model.numbers(parameters), request).check_steady()
-        return transient_words(model, run, look_beyond(run), asked=(cycles, duration, transient) != (None, None, None))
+        left_out = [] if asked else tables_left_out(model, run.numbers.values)
+        return [*left_out, *transient_words(model, run, look_beyond(run), asked=asked)]
     except SimulationError as fault:
         return [f"whether these are numbers of the steady machine is not known, for a longer run failed: {fault}"]
+
+
+def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
+    """A sentence where turns that a scene without a run takes lie behind rows of its tables over time."""
+    settings, turn = model.run_settings, driver_angle.period(model.manifest, values)
+    if settings.stated or settings.cycles is None or not math.isfinite(turn):
+        return []
+    begin = settings.transient_cycles * turn
+    rows = driver_angle.rows_over_time(model.manifest, values, 0.0, begin)
+    if not len(rows):
+        return []
+    return [
+        f"turns {settings.transient_cycles:g} to {settings.cycles:g}, which a scene without a run takes, begin at "
+        f"{begin:.4g} s, and load, speed or slip follow tables over time before, with rows up to {rows[-1]:.4g} s: "
+        "what happens there is in no number here. Give the run that is meant, as "
+        f'--duration "{rows[-1]:.4g} s" --transient 0.'
+    ]
 
 
 def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bool) -> list[str]:

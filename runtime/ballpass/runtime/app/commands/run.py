@@ -141,7 +141,7 @@ def run(
         from ballpass.runtime.app.summary import add_turns, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.app.summary_words import stands_out
-        from ballpass.runtime.app.transient_words import transient_words
+        from ballpass.runtime.app.transient_words import tables_left_out, transient_words
         from ballpass.runtime.ask.peaks import run_of
         from ballpass.runtime.report.report import Report
         from ballpass.runtime.report.text import show as show_report
@@ -218,6 +218,9 @@ def run(
                 length = (cycles, duration, transient)
                 for words in transient_words(model, own, longer, asked=length != (None, None, None)):
                     warn(words)
+        if chosen:
+            for words in tables_left_out(model, model.numbers(asked.overrides).values):
+                warn(words)
         taken = solution.statistics
         asked_for = (
             model.quantities(
