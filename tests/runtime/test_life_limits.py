@@ -57,6 +57,24 @@ def test_a_bearing_within_all_limits_gets_no_word(make_model: Callable[..., Mode
     assert any("n d_m = 1.28e+06 mm/min exceeds 500000" in words for words in fast)
 
 
+def test_a_short_burst_of_speed_is_judged_by_its_highest(make_model: Callable[..., Model]) -> None:
+    """Most of the time 300 rpm, for a moment 18 000 rpm: 33.5 mm by 18 000 rpm is beyond what grease allows."""
+    rows = (
+        'time = ["0 s", "1 s", "1.02 s", "1.04 s", "1.06 s"], speed = ["300 rpm", "300 rpm", "{0}", "{0}", "300 rpm"]'
+    )
+    model = make_model(
+        "four_bar",
+        ('speed = "600 rpm"', f"table = {{ {rows.format('18000 rpm')} }}"),
+        ("cycles = 4\n", 'duration = "1.2 s"\n'),
+    )
+    light = {f"mechanism.bodies.{body}.mass": 1e-4 for body in ("crank", "coupler", "rocker")}
+    light |= {f"mechanism.bodies.{body}.inertia": 1e-8 for body in ("crank", "coupler", "rocker")}
+    fast = model.life(parameters=light, transient=0).beyond
+    assert any("n d_m at the highest speed = 6.03e+05 mm/min exceeds 500000" in words for words in fast)
+    calm = light | {f"mechanism.driver.table.speed.{row}": 300.0 * math.pi / 30.0 for row in (3, 4)}
+    assert not any("n d_m" in words for words in model.life(parameters=calm, transient=0).beyond)
+
+
 @pytest.mark.parametrize("slip", [0.0, 0.1])
 def test_the_centrifugal_force_is_that_of_the_models_cage(make_model: Callable[..., Model], slip: float) -> None:
     """Where the outer ring turns balls go round faster, (1 + gamma)/2 of its speed; a cage that slips is slower."""

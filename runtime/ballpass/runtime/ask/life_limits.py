@@ -25,12 +25,15 @@ SPEED_FACTOR = 500.0 * 2.0 * math.pi / 60.0
 DENSITY, CENTRIFUGAL = 7800.0, 0.1
 
 
-def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStrength) -> Iterator[str]:
+def limits_of(
+    info: BearingInfo, values: Mapping[str, float], found: BearingStrength, fastest: float = 1.0
+) -> Iterator[str]:
     """What the bearing is beyond.
 
     Parameters
     ----------
     values : parameters and derived constants by name, with the driver at speed
+    fastest : highest speed of the run over its mean [1]
     """
     element, geometry = rated_element(info), geometry_of(info, values)
     noun = element.noun
@@ -55,18 +58,19 @@ def limits_of(info: BearingInfo, values: Mapping[str, float], found: BearingStre
         )
     if found.static_safety < 1.0:
         yield f"the static safety s_0 = {found.static_safety:.2g} is below 1, the least of ISO 76."
-    pitch, speed = float(geometry.pitch), abs(found.speed)
+    pitch, speed = float(geometry.pitch), fastest * abs(found.speed)
+    when = " at the highest speed" if fastest > 1.01 else ""
     cage = speed and speed * values[f"{info.path}.cage_speed"] / values[info.ring_speed]
     centrifugal = DENSITY * element.volume(geometry) * 0.5 * pitch * cage**2
     share = 5.0 * load / info.balls
     if centrifugal > CENTRIFUGAL * share > 0.0:  # without a load there is no life that it could shorten
         yield (
-            f"the centrifugal force of a {noun}, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the heaviest "
-            f"{noun}'s share of P, {share:.3g} N: the model's {noun}s have no mass, which holds to some "
+            f"the centrifugal force of a {noun}{when}, {centrifugal:.3g} N, is {centrifugal / share:.2g} of the "
+            f"heaviest {noun}'s share of P, {share:.3g} N: the model's {noun}s have no mass, which holds to some "
             f"{CENTRIFUGAL:g}. The outer ring carries more than is said here."
         )
     if pitch * speed > SPEED_FACTOR:
         yield (
-            f"n d_m = {pitch * speed * 30.0 / math.pi * 1e3:.3g} mm/min exceeds "
+            f"n d_m{when} = {pitch * speed * 30.0 / math.pi * 1e3:.3g} mm/min exceeds "
             f"{SPEED_FACTOR * 30.0 / math.pi * 1e3:.0f} mm/min, the usual limit of makers' catalogues with grease."
         )

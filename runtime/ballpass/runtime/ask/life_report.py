@@ -143,7 +143,7 @@ def _bearing(
     tilt = _tilt(info, values, load)
     return replace(
         strength,
-        beyond=(*limits_of(info, moving, strength), *filter(None, (tilt.beyond,))),
+        beyond=(*limits_of(info, moving, strength, history.fastest), *filter(None, (tilt.beyond,))),
         oscillation=_oscillation(info, values, ratings, samples, load, force) if why and turning else None,
         tilt=tilt,
     )

@@ -40,6 +40,7 @@ class LoadHistory:
     turns : how long its steady part was; None where nothing turns
     duration : of that [s]
     shaft_speed : mean of driver or shaft [rad/s]
+    fastest : its highest speed over that, 1 where it does not change [1]
     speeds : mean speed of the inner ring of each bearing against the outer one, by its prefix [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
     settled : whether that counts as none
@@ -51,6 +52,7 @@ class LoadHistory:
     turns: float | None
     duration: float
     shaft_speed: float
+    fastest: float
     speeds: Mapping[str, float]
     change: float
     settled: bool
@@ -108,9 +110,11 @@ def _history(going: ReducedRun) -> LoadHistory:
     """Loads so far."""
     manifest, layout = going.run.model.manifest, reduction_rows(going.run.model.manifest)
     duration = float(going.row[HEAD.index("duration")])
-    speed = driver_angle.shaft_speed(manifest, going.run.numbers.values)
+    speed, fastest = driver_angle.shaft_speed(manifest, going.run.numbers.values), 1.0
     if manifest.mechanism is not None and manifest.mechanism.rate:
-        speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
+        rate = reduction_of(layout, going.row, manifest.mechanism.rate, duration)
+        speed = rate.mean
+        fastest = max(rate.maximum, -rate.minimum) / abs(speed) if speed else 1.0
     powers, peaks, speeds = {}, {}, {}
     for bearing in manifest.bearings:
         found = load_powers(manifest, bearing, going.row[None, :], going.run.numbers.values)
@@ -129,6 +133,7 @@ def _history(going: ReducedRun) -> LoadHistory:
         turns=duration * abs(speed) / driver_angle.TURN if speed else None,
         duration=duration,
         shaft_speed=speed,
+        fastest=fastest,
         speeds=speeds,
         change=math.inf,
         settled=False,
