@@ -451,10 +451,6 @@ TWO_WAY = ("share = 0.5                             # [paper]", 'coupling = "two
         (('joint = "A"\ncoupling', 'joint = "D"\ncoupling'), "must sit at a revolute joint"),
         (('joint = "A"\ncoupling', 'joint = "B"\ncoupling'), "which one carries the inner ring"),
         (('coupling = "two-way"', 'coupling = "two-way"\nshare = 0.5'), "takes the load that the motion gives"),
-        (
-            ("[bearing.damping]", '[bearing.cage]\njitter = { interval = "1 ms" }\n[bearing.damping]'),
-            "rings that turn at constant",
-        ),
     ],
 )
 def test_what_two_way_coupling_has_no_use_for_is_refused(

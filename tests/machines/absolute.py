@@ -74,6 +74,8 @@ class Absolute:
         self.motor, self.table = self.mechanism.driver.torque, self.mechanism.driver.table  # neither: constant speed
         self.free = self.motor is not None or self.table is not None  # the driver's angle is a state
         self.acceleration = 0.0  # of the driver, where its speed is given
+        self.lagging = [b for b in self.bearings if b.cage is not None and b.cage.time]  # slip that changes
+        self.lags, self.time = dict.fromkeys((b.name for b in self.lagging), 0.0), 0.0
         self._arms: dict[tuple[str, str], Array] = {}
         self._chain = [(self.start, self._closed(self.start, self._guessed(guess)))]
 
@@ -236,10 +238,11 @@ class Absolute:
         return q
 
     def drive(self, t: float, x: Array) -> tuple[float, float]:
-        """Angle and speed of the driven body: last of the state's positions and velocities where the speed changes."""
+        """Angle and speed of the driven body: in the state, before the lags of cages, where the speed changes."""
         if not self.free:
             return self.start + self.speed * t, self.speed
-        return float(x[len(x) // 2 - 1]), float(x[-1])
+        behind = 1 + len(self.lagging)
+        return float(x[len(x) // 2 - behind]), float(x[-behind])
 
     def slope(self, t: float) -> float:
         """Acceleration of the driver by the table of its speed."""
@@ -253,6 +256,8 @@ class Absolute:
     def absolute(self, t: float, x: Array) -> tuple[Array, Array]:
         """Positions and velocities of all bodies and rings, from a state of the scene: positions, then velocities."""
         (angle, rate), half = self.drive(t, x), len(x) // 2
+        self.time, last = t, x[len(x) - len(self.lagging) :]
+        self.lags = {bearing.name: float(lag) for bearing, lag in zip(self.lagging, last, strict=True)}
         shifts: dict[str, Array] = {}
         speeds: dict[str, Array] = {}
         rings, ring_rates, k = [], [], 0

@@ -16,7 +16,8 @@ def drawn(rng: np.random.Generator, derived: Derived, machine: Multibody) -> tup
     t = float(rng.uniform(0, 2)) * 2 * math.pi / abs(machine.speed or 1.0)
     x = np.concatenate([rng.uniform(-3e-5, 3e-5, size), rng.uniform(-0.1, 0.1, size)])
     if machine.free:
-        x[size - 1], x[-1] = machine.start + rng.uniform(-10, 10), rng.uniform(-60, 60)
+        behind = 1 + len(machine.lagging)
+        x[size - behind], x[-behind] = machine.start + rng.uniform(-10, 10), rng.uniform(-60, 60)
     angle, _ = machine.drive(t, x)
     spalls = derived.spall_gates(t)
     return t, x, spalls | {name: machine.gate(name, angle) for name in derived.gates() if name not in spalls}

@@ -41,6 +41,10 @@ EFFECTS = """[bearing.outer_waviness]
 [bearing.cage]
 slip = 0.03
 """
+CHANGING_SLIP = """[bearing.cage]
+slip = { time = ["0 s", "0.03 s", "0.07 s"], value = [0.0, 0.3, 0.05], lag = "2 deg" }
+"""
+LAGGING = EFFECTS.replace("[bearing.cage]\nslip = 0.03\n", CHANGING_SLIP)
 SPALLS = "".join(
     f'[bearing.defects.{name}]\non = "{on}"\n{"ball = 2" if on == "ball" else ""}\nangle = "{angle} deg"\n'
     f'chord = "{chord} mm"\nprofile = "{profile}"\n{depth}\n'
@@ -170,7 +174,7 @@ class Derived:
 
     def _slope(self, table: Input, t: float) -> float:
         """Of a table over time, flat before its first row and behind its last."""
-        times, heights = (np.array([self.values[name] for name in column]) for column in (table.times, table.values))
+        times, heights = (np.array([self._known[name] for name in column]) for column in (table.times, table.values))
         return float(np.concatenate([[0.0], np.diff(heights) / np.diff(times), [0.0]])[np.searchsorted(times, t)])
 
     def gates(self, value: float = 0.0) -> dict[str, float]:
@@ -199,8 +203,8 @@ class Derived:
     def points(self) -> dict[tuple[str, str], tuple[float, float]]:
         """Points of the linkage without play at the start, by body and name [m]."""
         x = np.zeros(2 * len(self.coordinates))
-        if self.coordinates[-1:] == ["driver.angle"]:
-            x[len(self.coordinates) - 1] = self.values["mechanism.driver.start_angle"]
+        if "driver.angle" in self.coordinates:
+            x[self.coordinates.index("driver.angle")] = self.values["mechanism.driver.start_angle"]
         found = self.at(0.0, x, self.gates())[3].reshape(-1, 2)
         assert self.system.linkage is not None
         return {

@@ -58,9 +58,10 @@ class Multibody(Absolute):
         return 2 * self.value(motor.breakdown_torque) / (ratio + 1 / ratio)
 
     def ball_angle(self, bearing: Bearing, q: Array) -> float:
-        """Rolling from the ideal linkage at the start: each ring's turn with its weight."""
-        turned = (w * angle for w, angle in zip(self.weights(bearing), self.turned(bearing, q), strict=True))
-        return self.value(bearing.ball_angle) + sum(turned)
+        """Rolling from the ideal linkage at the start: each ring's turn with its weight, less the lag of the cage."""
+        weights = self.weights(bearing, math.inf)
+        turned = (w * angle for w, angle in zip(weights, self.turned(bearing, q), strict=True))
+        return self.value(bearing.ball_angle) + sum(turned) - self.lags.get(bearing.name, 0.0)
 
     def turned(self, bearing: Bearing, q: Array) -> tuple[float, float]:
         """How far the inner and the outer ring have turned since the start."""
@@ -68,12 +69,19 @@ class Multibody(Absolute):
         inner, outer = bearing.inner_body, joint.other(bearing.inner_body)
         return self.angle(inner, q) - self.angle(inner, start), self.angle(outer, q) - self.angle(outer, start)
 
-    def weights(self, bearing: Bearing) -> tuple[float, float]:
+    def slip(self, bearing: Bearing, time: float) -> float:
+        """Of the cage: that of the row that holds."""
+        if bearing.cage is None or not bearing.cage.time:
+            return 0.0 if bearing.cage is None else self.value(bearing.cage.slip)
+        rows = zip(bearing.cage.time, bearing.cage.slips, strict=True)
+        return [self.value(slip) for start, slip in rows if self.value(start) <= time][-1]
+
+    def weights(self, bearing: Bearing, time: float | None = None) -> tuple[float, float]:
         """Raceways' radii roll on the ball: R_i w_i + R_o w_o over their sum; a cage that slips keeps less of the way
-        over the ring that stands, or the outer one."""
+        over the ring that stands, or the outer one.  None: now."""
         rolling, pitch = self.cosine(bearing) * self.value(bearing.ball_diameter), self.value(bearing.pitch_diameter)
         inner, outer = (pitch - rolling) / 2, (pitch + rolling) / 2
-        kept = 1.0 - (self.value(bearing.cage.slip) if bearing.cage is not None else 0.0)
+        kept = 1.0 - self.slip(bearing, self.time if time is None else time)
         if bearing.inner_body == FRAME:
             return 1.0 - kept * outer / (inner + outer), kept * outer / (inner + outer)
         return kept * inner / (inner + outer), 1.0 - kept * inner / (inner + outer)
@@ -85,7 +93,7 @@ class Multibody(Absolute):
     def taken(self, bearing: Bearing, ball: int, q: Array) -> tuple[float, float]:
         """What effects take from a ball's deflection, and its slope over the inner ring's angle against the outer."""
         angle, (inner, outer) = self.ball_angle(bearing, q), self.turned(bearing, q)
-        share, step = self.weights(bearing)[0], 1e-200j
+        (share, _), (end, _), step = self.weights(bearing), self.weights(bearing, math.inf), 1e-200j
         angle += TURN * (ball - 1) / bearing.balls
         # the circle of contacts on the outer raceway over the ball's radius
         passed = self.cosine(bearing) + self.value(bearing.pitch_diameter) / self.value(bearing.ball_diameter)
@@ -95,7 +103,7 @@ class Multibody(Absolute):
             ball,
             angle - outer + share * step,
             angle - inner + (share - 1) * step,
-            passed * share * (inner - outer + step),
+            passed * (end * (inner - outer) - self.lags.get(bearing.name, 0.0) + share * step),
         )
         return found.real, found.imag / step.imag
 
@@ -343,6 +351,10 @@ class Multibody(Absolute):
                 found |= {f"{prefix}{name}.{axis}": float(s) for axis, s in zip("xy", second, strict=True)}
             force = self.ring_force(bearing, q, v)
             outputs |= {f"{prefix}ring_force.{axis}": float(f) for axis, f in zip("xy", force, strict=True)}
+            if bearing in self.lagging:
+                bodies = bearing.inner_body, self.mechanism.joint(bearing.joint or "").other(bearing.inner_body)
+                lost = np.subtract(self.weights(bearing, math.inf), self.weights(bearing))
+                found[f"{prefix}cage.lag_integral"] = float(lost @ [self.row(body) @ v for body in bodies])
         return Found(found, outputs, a)
 
     def _solve(self, rows: Array, pushed: Array, rest: Array) -> tuple[Array, Array]:
@@ -368,7 +380,8 @@ class Multibody(Absolute):
         if self.free:
             positions.append(self.angle(self.driven, q))
             velocities.append(float(self.row(self.driven) @ v))
-        return np.array([*positions, *velocities])
+        lags = [self.lags[bearing.name] for bearing in self.lagging]
+        return np.array([*positions, *(0.0 for _ in lags), *velocities, *lags])
 
     def energy(self, t: float, x: Array) -> tuple[float, float]:
         """Kinetic energy, and potential energy of weight, balls, housings and springs [J]."""

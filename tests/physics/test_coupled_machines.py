@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from comparison import drawn, largest_difference, largest_imbalance
 from coupled_scenes import (
+    CHANGING_SLIP,
     EFFECTS,
     HUNT,
+    LAGGING,
     ONE_SIDED,
     SPALLS,
     Derived,
@@ -117,6 +119,21 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         "punching_press",
         driven_by(MOTOR),
         (bearing("A", effects=SPALLS), bearing("B", "crank", count=2, effects=EFFECTS + SPALLS)),
+    ),
+    "press, slip that changes": (
+        "punching_press",
+        (),
+        (bearing("A", "frame", effects=LAGGING + SPALLS), bearing("B", "rod", elastic=True, effects=LAGGING + SPALLS)),
+    ),
+    "press, slip that changes, motor": (
+        "punching_press",
+        driven_by(MOTOR),
+        (bearing("A", count=2, effects=LAGGING + SPALLS, angle="25 deg"), bearing("B", "crank", effects=CHANGING_SLIP)),
+    ),
+    "press, slip that changes, run-up": (
+        "punching_press",
+        (*OFF_CENTRE, (SPEED, RUN_UP)),
+        (bearing("A", elastic=True, effects=LAGGING + SPALLS), bearing("B", "rod", effects=LAGGING)),
     ),
     "press, unlike bearings side by side": (
         "punching_press",

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from ball_effects import taken
 from comparison import drawn, power_imbalance
-from coupled_scenes import EFFECTS, POWERS, RUN, SPALLS, TANGENT, UNDAMPED, Derived, bearing, with_bearings
+from coupled_scenes import EFFECTS, LAGGING, POWERS, RUN, SPALLS, TANGENT, UNDAMPED, Derived, bearing, with_bearings
 from multibody import Multibody
 from virtual import virtual_model
 
@@ -61,11 +61,11 @@ ALL = EFFECTS + SPALLS
     [
         press(bearing("A", elastic=True, count=2, effects=ALL, angle="25 deg")),
         pytest.param(
-            press(bearing("A", "frame", effects=ALL), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
+            press(bearing("A", "frame", effects=LAGGING), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
             marks=pytest.mark.long,
         ),
     ],
-    ids=["constant speed, contact angle", "motor, outer ring on the crank"],
+    ids=["constant speed, contact angle", "motor, outer ring on the crank, slip that changes"],
 )
 def test_powers_of_all_forces_are_the_change_of_the_kinetic_energy(text: str) -> None:
     """Balls that roll over waves and edges turn the rings; without that power the balance misses by 2e-4."""
@@ -119,6 +119,36 @@ def test_a_table_of_one_speed_gives_the_forces_of_that_speed(tmp_path: Path) -> 
         one, other = steady.evaluate(t, x, names), table.evaluate(t, driven, names)
         for name in names:
             assert other[name] == pytest.approx(one[name], rel=1e-9, abs=1e-9 * np.max(np.abs(one[name])))
+
+
+@pytest.mark.long
+def test_a_slip_that_changes_is_the_same_as_a_state_and_known_before_the_run(tmp_path: Path) -> None:
+    """At constant speed the lag is a table over time, and spalls are met at known times; with a table of one speed the
+    lag is integrated and edges are located."""
+    effects = LAGGING + SPALL
+    even = ONE_WAY.replace(ALL.replace("[bearing.", "[bearings.at_A."), effects.replace("[bearing.", "[bearings.at_A."))
+    even = press(f'{even}[bearings.at_A.inner_ring]\nmass = "0.4 kg"\n')
+    assert "excess_slip" not in even
+    known, state = (built(text, tmp_path / name) for name, text in (("a", even), ("b", even.replace(SPEED, FLAT))))
+    way = {"method": "stepper-dop853", "kinks": "located", "rtol": 1e-11}
+    one, other = (m.simulate(duration=0.12, transient=0, samples_per_cycle=50, **way) for m in (known, state))
+    for name in known.states:
+        assert other[name] == pytest.approx(one[name], abs=1e-8 * np.max(np.abs(one[name])))
+    rolled = known.constants()["bearings.at_A.cage_ratio"] * known.parameters["mechanism.driver.speed"]
+    lag = np.deg2rad(2) + rolled * (-0.05 * np.minimum(one.t, 0.03) + 0.25 * np.clip(one.t - 0.03, 0.0, 0.04))
+    assert other["at_A.cage.lag"] == pytest.approx(lag, abs=1e-9)
+    for at in (0.02, 0.05, 0.1):
+        rest, there = state.static_equilibrium(t=at), known.static_equilibrium(t=at)
+        assert rest.ball_force == pytest.approx(there.ball_force, rel=1e-9, abs=1e-9 * there.peak_ball_force)
+        names = [f"bearings.at_A.cage.slip.{name}" for name in ("value.1", "value.3", "time.2", "lag")]
+        slopes = [r.derivative("at_A.ball.elastic_force", [*names, "time"]) for r in (rest, there)]
+        assert slopes[0] == pytest.approx(slopes[1], rel=1e-6, abs=1e-6 * np.max(np.abs(slopes[1])))
+    names = [f"bearings.at_A.cage.slip.{name}" for name in ("value.2", "value.3", "time.2", "lag")]
+    columns = []
+    for model in (known, state):
+        found = model.sensitivities(names, duration=0.12, method="stepper-dop853", rtol=1e-11).x[-1]
+        columns.append(found[[model.states.index(name) for name in known.states]])
+    assert columns[1] == pytest.approx(columns[0], rel=1e-6, abs=1e-6 * np.max(np.abs(columns[0])))
 
 
 #: With preload, so that every ball strikes the edges.
@@ -209,7 +239,7 @@ def test_a_machine_that_coasts_keeps_its_energy_with_every_effect(tmp_path: Path
 @pytest.mark.long
 def test_derivatives_and_members_are_right_where_the_motion_meets_the_spalls(tmp_path: Path) -> None:
     """Against differences of located runs, and single runs; a motor turns the crank, and the rod swings."""
-    text = press(bearing("A", law=TANGENT, effects=EFFECTS), bearing("B", "rod", effects=EFFECTS + SPALL), drive=MOTOR)
+    text = press(bearing("A", law=TANGENT, effects=EFFECTS), bearing("B", "rod", effects=LAGGING + SPALL), drive=MOTOR)
     model = built(text, tmp_path / "press")
     names = [
         "bearings.at_B.defects.spall.angle",
@@ -217,6 +247,10 @@ def test_derivatives_and_members_are_right_where_the_motion_meets_the_spalls(tmp
         "bearings.at_B.inner_waviness.9.amplitude",
         "bearings.at_A.ball_waviness.each.4.amplitude",
         "bearings.at_A.cage.slip",
+        "bearings.at_B.cage.slip.value.1",
+        "bearings.at_B.cage.slip.value.2",
+        "bearings.at_B.cage.slip.time.2",
+        "bearings.at_B.cage.slip.lag",
         "bearings.at_B.ball_angle",
     ]
     length = {"duration": 0.04, "transient": 0}
@@ -241,14 +275,15 @@ def test_derivatives_and_members_are_right_where_the_motion_meets_the_spalls(tmp
 @pytest.mark.long
 def test_lanes_take_effects_in_every_coupling(tmp_path: Path) -> None:
     """Two-way at constant speed, kinks stepped over: members beside each other in lanes are those alone."""
-    model = built(press(bearing("A", effects=EFFECTS), bearing("B", "rod", effects=EFFECTS)), tmp_path / "model")
-    amplitudes = {"bearings.at_B.outer_waviness.7.amplitude": np.linspace(1e-6, 3e-6, 9)}
-    many = model.simulate_many(amplitudes, ["max:at_B.ball.force"], cycles=0.5, transient=0, rtol=1e-5)
+    model = built(press(bearing("A", effects=LAGGING), bearing("B", "rod", effects=EFFECTS)), tmp_path / "model")
+    varied = {
+        "bearings.at_B.outer_waviness.7.amplitude": np.linspace(1e-6, 3e-6, 9),
+        "bearings.at_A.cage.slip.value.1": np.linspace(0.0, 0.4, 9),
+    }
+    many = model.simulate_many(varied, ["max:at_B.ball.force"], cycles=0.5, transient=0, rtol=1e-5)
     assert many.statistics.lanes > 1
-    fine = [
-        model.reduce(cycles=0.5, transient=0, rtol=1e-9, parameters={next(iter(amplitudes)): value})
-        for value in amplitudes["bearings.at_B.outer_waviness.7.amplitude"][[0, -1]]
-    ]
+    ends = [{name: values[k] for name, values in varied.items()} for k in (0, -1)]
+    fine = [model.reduce(cycles=0.5, transient=0, rtol=1e-9, parameters=end) for end in ends]
     expected = [one["at_B.ball.force"].maximum for one in fine]
     assert many["max:at_B.ball.force"][[0, -1]] == pytest.approx(expected, rel=2e-3)
     assert abs(expected[1] / expected[0] - 1) > 1e-2
@@ -299,10 +334,7 @@ def scene_bearings(outer: bool) -> tuple:  # type: ignore[type-arg]
 
 
 def test_what_has_no_model_is_refused(scene_text: Callable[..., str]) -> None:
-    """A slip that changes beside uneven rings, half a bearing, an unbalance on a ring that stands."""
-    changing = '[bearing.cage]\nslip = { time = ["0 s", "1 s"], value = [0.0, 0.1] }\n[bearing.damping]'
-    with pytest.raises(SceneError, match=r"bearing.cage.slip.*changes over time"):
-        scene_from_text(scene_text("punching_press_two_way", ("[bearing.damping]", changing)), "press")
+    """Half a bearing, an unbalance on a ring that stands."""
     with pytest.raises(SceneError, match=r"bearing.count.*no number of bearings"):
         scene_from_text(scene_text("punching_press_two_way", ("count = 2 ", "count = 1.5 ")), "press")
     with pytest.raises(SceneError, match="acts on the inner ring, which stands"):

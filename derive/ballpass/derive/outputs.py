@@ -34,11 +34,9 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     of = f" of {prefix[:-1]}" if prefix else ""
     out: list[Output] = []
     for name, c in named_rings(bearing):
-        out.append(Output(name=name, expression=c.position, unit=c.unit, description=f"Position {c.description}"))
+        out.append(Output(name=name, expression=c.position, unit=c.unit, description=c.words[0]))
     for name, c in named_rings(bearing, "v"):
-        out.append(
-            Output(name=name, expression=c.velocity, unit=f"{c.unit}/s", description=f"Velocity {c.description}")
-        )
+        out.append(Output(name=name, expression=c.velocity, unit=c.velocity_unit, description=c.words[1]))
     ball = bearing.ball
     noun = bearing.noun
     per_ball = [

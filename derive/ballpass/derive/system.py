@@ -118,15 +118,15 @@ class System:
     def states(self) -> tuple[State, ...]:
         """Positions, then velocities."""
         positions = (
-            State(name=c.name, symbol=c.position, unit=c.unit, description=f"Position {c.description}", latex=c.latex)
+            State(name=c.name, symbol=c.position, unit=c.unit, description=c.words[0], latex=c.latex)
             for c in self.coordinates
         )
         velocities = (
             State(
                 name=c.velocity.name,
                 symbol=c.velocity,
-                unit=f"{c.unit}/s",
-                description=f"Velocity {c.description}",
+                unit=c.velocity_unit,
+                description=c.words[1],
                 latex=rf"\dot {c.latex}",
             )
             for c in self.coordinates
@@ -302,8 +302,8 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         scene,
         models,
         errors,
-        inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
-        switches=tuple(switch for cage in cages for switch in cage.switches),
+        inputs=(*drive.inputs, *forces.inputs),
+        cages=cages,
         drive=drive,
         forces=forces,
         definitions=(*known, *reactions.definitions, *motion.definitions),
@@ -406,8 +406,8 @@ def _of_rings(
         scene,
         [one.model for one in rings],
         errors,
-        inputs=(*inputs, *(i for one in rings for i in one.cage.inputs)),
-        switches=tuple(switch for one in rings for switch in one.cage.switches),
+        inputs=inputs,
+        cages=[one.cage for one in rings],
         definitions=(*definitions, *(d for one in rings for d in one.cage.definitions)),
         constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
         quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
@@ -439,6 +439,7 @@ def _system(
     bearings: Sequence[BearingModel],
     errors: list[SceneError],
     *,
+    cages: Sequence[Cage],
     inputs: tuple[Input, ...],
     definitions: tuple[Definition, ...],
     constants: tuple[Definition, ...],
@@ -451,18 +452,20 @@ def _system(
     linear_forms: tuple[Definition, ...] = (),
     drive: Drive | None = None,
     forces: Forces | None = None,
-    switches: tuple[StateSwitch, ...] = (),
 ) -> System:
-    driven, switches = _driven(drive), (*(() if forces is None else forces.switches), *switches)
-    if drive is not None and _driven(drive, known=True):
+    driven, lags = _driven(drive), [cage.lag for cage in cages if cage.lag is not None]
+    switches = (() if forces is None else forces.switches) + tuple(s for cage in cages for s in cage.switches)
+    inputs = (*inputs, *(i for cage in cages for i in cage.inputs))
+    known = [] if drive is None else [drive.acceleration for _ in _driven(drive, known=True)]
+    for acceleration in (*known, *(rate for _, rate in lags)):
         mass = sp.ImmutableMatrix(sp.diag(mass, 1))
-        forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([drive.acceleration])))
+        forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([acceleration])))
     outputs: tuple[Output, ...] = ()
     requested = (*requested, *balance_outputs((*quantities, *requested)))
     with _noted(errors):
         outputs = select_outputs(quantities, requested, scene.outputs)
-    known = {o.name for o in quantities}
-    named = tuple(o for o in outputs if o.name not in known)
+    listed = {o.name for o in quantities}
+    named = tuple(o for o in outputs if o.name not in listed)
     return System(
         scene=scene,
         parameters=tuple(
@@ -472,8 +475,12 @@ def _system(
             for q in scene.quantities
         ),
         inputs=inputs,
-        coordinates=(*(c for bearing in scene.bearings for c in own_coordinates(bearing)), *driven),
-        initial=_initial(scene, driven),
+        coordinates=(
+            *(c for bearing in scene.bearings for c in own_coordinates(bearing)),
+            *driven,
+            *(lag for lag, _ in lags),
+        ),
+        initial=_initial(scene, driven, [b for b, c in zip(scene.bearings, cages, strict=True) if c.lag is not None]),
         constants=(*constants, *dict.fromkeys(c for o in named for c in o.constants)),
         definitions=definitions,
         mass=mass,
@@ -494,11 +501,13 @@ def _system(
     )
 
 
-def _initial(scene: Scene, driven: tuple[Coordinate, ...]) -> tuple[str, ...]:
+def _initial(scene: Scene, driven: tuple[Coordinate, ...], lagging: Sequence[Bearing]) -> tuple[str, ...]:
     """Parameters that hold the initial states: positions of all, then velocities."""
     found: list[str] = []
     for which, of_driver in (("position", "start_angle"), ("velocity", "speed")):
         found += [q.path for bearing in scene.bearings for q in getattr(bearing.initial, which)]
         if driven and scene.mechanism is not None:
             found.append(getattr(scene.mechanism.driver, of_driver).path)
+        # nothing depends on the integral of a lag
+        found += [b.cage.lag.path for b in lagging if b.cage is not None and b.cage.lag is not None]
     return tuple(found)

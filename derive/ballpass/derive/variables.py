@@ -80,15 +80,15 @@ class Coordinate:
     Attributes
     ----------
     name : of the position
-    kind : what is measured
-    unit : of the position; that of the velocity is the same per second
+    kind : what is measured; the lag of a cage is the velocity of its own integral over time, on which nothing depends
+    unit : of the position
     position, velocity : symbols
     group : coordinates of one group share a magnitude, which tolerances are relative to
     partner : coordinate of the other end of the contact, "" where that end is fixed: the difference of both matters
     """
 
     name: str
-    kind: Literal["displacement", "angle"]
+    kind: Literal["displacement", "angle", "lag"]
     unit: str
     position: sp.Symbol
     velocity: sp.Symbol
@@ -96,6 +96,18 @@ class Coordinate:
     description: str
     group: str
     partner: str = ""
+
+    @property
+    def velocity_unit(self) -> str:
+        """Unit of the velocity."""
+        return "rad" if self.kind == "lag" else f"{self.unit}/s"
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """Of position and velocity, for people."""
+        if self.kind == "lag":
+            return f"Integral over time of the {self.description}", f"A{self.description[1:]}"
+        return f"Position {self.description}", f"Velocity {self.description}"
 
     @property
     def acceleration(self) -> sp.Symbol:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage_slip import kept_share, lag_of
+from ballpass.derive.bearing.cage_slip import kept_share, lag_of, lag_state
 from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
@@ -19,7 +19,7 @@ from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
-from ballpass.derive.variables import Input, StateSwitch, phase
+from ballpass.derive.variables import Coordinate, Input, StateSwitch, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +34,13 @@ class Cage:
         coordinate; and what effects need
     constants, definitions : of the symbols in these
     spin : angle of a ball's own material that meets the outer raceway, None where no effect asks for it [rad]
-    share : of the inner ring's speed in that of the cage, slip included; the rest is that of the outer ring's
+    share : of the inner ring's speed in that of the cage, slip included; the rest is that of the outer ring's; a
+        function of time where the slip changes
     ring_rate : of the inner ring relative to the outer one [rad/s]; None where effects do not need it: without any, and
         where rings that are loaded one-way turn evenly
     switches : places of the motion at which a ball enters or leaves a spall, where these times are not known before
+    lag : coordinate whose velocity is the angle by which the cage lags, and the rate of that [rad/s]; None where the
+        slip does not change, and where rings that are loaded one-way turn evenly
     """
 
     angle: sp.Expr
@@ -51,6 +54,7 @@ class Cage:
     spin: sp.Expr | None = None
     ring_rate: sp.Symbol | None = None
     switches: tuple[StateSwitch, ...] = ()
+    lag: tuple[Coordinate, sp.Expr] | None = None
 
 
 def cage_ratio(names: Names) -> sp.Symbol:
@@ -175,15 +179,31 @@ def cage_between(
     driver_speed, start = symbol_of(driver.speed), symbol_of(driver.start_angle)
     speed, share = names.constant("cage_speed"), cage_ratio(names)
     constants: tuple[Definition, ...] = (_ratio(bearing, names),)
+    about_inner = swings[0] is STILL
     if bearing.cage is not None and bearing.cage.slipping:
-        slipping = _slipping(bearing, names, about_inner=swings[0] is STILL)
+        slipping = _slipping(bearing, names, about_inner=about_inner)
         constants, share = (*constants, slipping), slipping.symbol
+    # of the last row, as are all angles less the lag
     weights = (share, 1 - share)
     swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
     turns = sum((w * s.turns for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
+    lag, share_now, behind = lag_state(bearing, names), share, sp.S.Zero
+    rolling = cage_ratio(names) - (1 if about_inner else 0)
+    if lag is not None:
+        share_now = ledger.define(
+            f"{bearing.prefix}cage.share",
+            share - rolling * lag.excess.symbol,
+            "1",
+            "share of the inner ring's speed in that of the cage",
+            names.latex(r"\kappa_c(t)"),
+        )
+        behind, constants = lag.coordinate.velocity, (*constants, *lag.constants)
+        words = "Turns of the balls over the ring that slip is seen from, in one of the driver, if they rolled"
+        rolled = rolling * (swings[0].turns - swings[1].turns)
+        constants += (names.define(names.constant("rolling_turns"), rolled, "1", words, "N_c"),)
     rate = ledger.define(
         f"{bearing.prefix}cage.rate",
-        sum((w * body.rate for w, body in zip(weights, bodies, strict=True)), start=sp.S.Zero),
+        sum((w * body.rate for w, body in zip((share_now, 1 - share_now), bodies, strict=True)), start=sp.S.Zero),
         "rad/s",
         "speed of the balls about the bearing's axis",
         names.latex(r"\dot\psi"),
@@ -208,9 +228,10 @@ def cage_between(
     def ball(part: str, turns: sp.Expr, swung: sp.Expr) -> sp.Expr:
         """Angle of ball 1, of which so many turns go with the driver's."""
         if free:
-            return symbol_of(bearing.ball_angle) + turns * (drive.angle - start) + swung
+            return symbol_of(bearing.ball_angle) + turns * (drive.angle - start) + swung - behind
         inputs.append(_phase(bearing, names, part))
-        return inputs[-1].symbol + names.constant(f"{part}_pass_speed" if part else "cage_speed") * TIME + swung
+        speed = names.constant(f"{part}_pass_speed" if part else "cage_speed")
+        return inputs[-1].symbol + speed * TIME + swung - behind
 
     angle, in_outer, over_outer = ball("", turns, swung), None, speed
     if outer is not STILL:
@@ -218,37 +239,44 @@ def cage_between(
         in_outer, over_outer = ball("outer", share * around, share * apart), names.constant("outer_pass_speed")
     constants += (_pass(names, "inner", (share - 1) * names.constant("ring_speed")),)
     in_inner = ball("inner", (share - 1) * around, (share - 1) * apart)
+    ring_rate: sp.Symbol | None = None
+    if bearing.effects or lag is not None:
+        ring_rate = ledger.define(
+            f"{bearing.prefix}cage.ring_rate",
+            bodies[0].rate - bodies[1].rate,
+            "rad/s",
+            "speed of the inner ring relative to the outer one",
+            names.latex(r"\omega_{io}"),
+        )
     cage = Cage(
         angle=angle,
         rate=rate,
         in_outer=angle if in_outer is None else in_outer,
         in_inner=in_inner,
-        inputs=tuple(inputs),
+        inputs=(*inputs, *(() if lag is None else (lag.excess,))),
         constants=constants,
         definitions=ledger.definitions,
-        share=share,
+        share=share_now,
+        lag=None if lag is None or ring_rate is None else (lag.coordinate, rolling * lag.excess.symbol * ring_rate),
     )
     if not bearing.effects:
         return cage
-    relative = ledger.define(
-        f"{bearing.prefix}cage.ring_rate",
-        bodies[0].rate - bodies[1].rate,
-        "rad/s",
-        "speed of the inner ring relative to the outer one",
-        names.latex(r"\omega_{io}"),
-    )
+    assert ring_rate is not None  # of effects
     rolls, spin = ball_turns(bearing), None
     if _spins(bearing):
-        spin = _spin(bearing, names, over_outer, rolls * share * apart)
+        spin = _spin(bearing, names, over_outer, rolls * (share * apart - behind))
         constants += spin.constants
         if free:
-            spin = replace(spin, angle=rolls * share * (around * (drive.angle - start) + apart), inputs=())
-    even = not free and all(one.swing == 0 for one in swings)
-    known = (over_outer, names.constant("inner_pass_speed")) if even else (share * relative, (share - 1) * relative)
+            turned = share * (around * (drive.angle - start) + apart) - behind
+            spin = replace(spin, angle=rolls * turned, inputs=())
+    even = not free and lag is None and all(one.swing == 0 for one in swings)
+    known = (over_outer, names.constant("inner_pass_speed"))
+    if not even:
+        known = (share_now * ring_rate, (share_now - 1) * ring_rate)
     passes = Passing(
         outer=(cage.in_outer, known[0]),
         inner=(in_inner, known[1]),
-        spin=None if spin is None else (spin.angle, spin.rate if even else rolls * share * relative),
+        spin=None if spin is None else (spin.angle, spin.rate if even else rolls * known[0]),
         even=even,
     )
     met = _met(bearing, names, passes)
@@ -258,7 +286,7 @@ def cage_between(
         constants=(*constants, *met.constants),
         definitions=(*ledger.definitions, *met.definitions),
         spin=None if spin is None else spin.angle,
-        ring_rate=relative,
+        ring_rate=ring_rate,
         switches=met.switches,
     )
 

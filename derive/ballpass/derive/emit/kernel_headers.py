@@ -71,7 +71,7 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         "BP_NG": kernels.slopes,
         "BP_LANES": LANES,
     }
-    names = [c.name for c in system.coordinates]
+    names, lags = [c.name for c in system.coordinates], [int(c.kind == "lag") for c in system.coordinates]
     groups = list(dict.fromkeys(c.group for c in system.coordinates))
     parts = [
         '#include <math.h>\n\n#include "trig.h"',
@@ -81,7 +81,8 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         + "\n"
         + _integers("bp_partner", [names.index(c.partner) if c.partner else -1 for c in system.coordinates])
         + "\n"
-        + _integers("bp_is_angle", [int(c.kind == "angle") for c in system.coordinates]),
+        + _integers("bp_is_angle", [int(c.kind != "displacement") for c in system.coordinates])
+        + ("\n#define BP_HAS_LAGS\n" + _integers("bp_is_lag", lags) if any(lags) else ""),
         "#define BP_EACH_BEARING(DO) " + " ".join(f"DO({k})" for k in range(count)),
         *(_bearing(k, kernels.bearings, lives[k]) for k in range(count)),
         *(_single(k) for k in kernels.functions),

@@ -80,8 +80,6 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         joint, share = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
-        over_time = mechanism is not None and mechanism.driver.table is not None
-        uneven = 'coupling = "two-way"' if coupling == "two-way" else "mechanism.driver.table" * over_time
         _refuse_angle(table, element)
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
@@ -102,7 +100,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             initial=_read_initial(table, moving_outer=support is not None),
             element=element.name,
             catalogue=catalogue,
-            cage=read_cage(table, uneven),
+            cage=read_cage(table),
             lubrication=read_lubrication(table),
             alignment=read_alignment(table),
         )

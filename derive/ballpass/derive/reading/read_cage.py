@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from ballpass.derive.scene.bearing_records import CageMotion
 from ballpass.derive.scene.keys import ColumnKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_keys, read_record
+from ballpass.derive.scene.read_keys import declared, keys_of, number, quantity, read_keys, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
 #: Most rows of a random slip: each is a number of the model.
 MOST_ROWS = 500
-#: Columns of a slip over time.
+#: Keys of a slip over time.
 SLIPS = {
     "time": ColumnKey(
         unit="s", words="Time from which the cage's slip of row ROW holds", symbol="t_{c,ROW}", note="the first is zero"
@@ -27,6 +27,13 @@ SLIPS = {
         usual=UsualRange(
             least=-0.3, most=0.3, hint="A cage lags by some hundredths: check whether a percentage was given."
         ),
+    ),
+    "lag": number(
+        "rad",
+        "Angle by which the cage lags at the start",
+        r"\lambda_0",
+        default="0 deg",
+        note="behind one that has the slip of the last row",
     ),
 }
 
@@ -41,33 +48,19 @@ class Jitter:
     seed: int = declared(WholeKey(words="Seed", lowest=0, highest=2**63 - 1, example=1))
 
 
-def read_cage(table: Table, uneven: str) -> CageMotion | None:
-    """The table ``cage`` of a bearing; None where there is none.
-
-    Parameters
-    ----------
-    uneven : what makes the rings turn unevenly, so that slip does not change over time; empty where nothing does
-    """
+def read_cage(table: Table) -> CageMotion | None:
+    """The table ``cage`` of a bearing; None where there is none."""
     if not table.has("cage"):
         return None
     with table.table("cage", "ratio or slip") as cage:
         cage.know(*keys_of(CageMotion), "jitter")
-        changing = [key for key in ("slip", "jitter") if key == "jitter" or isinstance(cage.data.get(key), dict)]
-        for key in (key for key in changing if uneven and cage.has(key)):
-            cage.fault(
-                key,
-                "a slip that changes over time is modelled for rings that turn at constant speed",
-                given=f"{key} that changes, and {uneven}",
-                allowed='one number, as in slip = 0.02; or coupling = "one-way" and a driver of constant speed',
-                remedy="delete jitter" if key == "jitter" else "write the mean slip",
-            )
         if cage.has("jitter"):
             cage.data = {**cage.data, "slip": _jitter(cage)}
         if not isinstance(cage.data.get("slip"), dict):
             return read_record(CageMotion, cage, time=(), slips=())
         with cage.table("slip") as rows:
-            time, slips = read_keys(rows, SLIPS).values()
-        return read_record(CageMotion, cage, slip=None, time=time, slips=slips)
+            time, slips, lag = read_keys(rows, SLIPS).values()
+        return read_record(CageMotion, cage, slip=None, time=time, slips=slips, lag=lag)
 
 
 def _jitter(cage: Table) -> object:

@@ -129,7 +129,7 @@ class CageMotion:
     """The cage of a scene: its ratio to the inner ring's speed instead of that of rolling, and its slip.
 
     `slip` is the part by which it turns slower [1].  None: rolling, or the slip of each row of a table holds from its
-    `time` [s] until the next; the first is zero.
+    `time` [s] until the next; the first is zero.  `lag` is the angle by which it lags then [rad].
     """
 
     ratio: SceneNumber | None = quantity(
@@ -151,11 +151,11 @@ class CageMotion:
         bounds=Bounds(above=-1.0, below=1.0),
         usual=UsualRange(least=0.0, most=0.3, hint=_PERCENTS),
         note="seen from the ring that stands, or the outer one where both turn. Or a table over time, from 0 s on, "
-        'each value constant until the next row: `{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`; not with '
-        '`coupling = "two-way"` or `driver.table`',
+        'each value constant until the next row: `{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`',
     )
     time: tuple[SceneNumber, ...] = ()
     slips: tuple[SceneNumber, ...] = ()
+    lag: SceneNumber | None = None
 
     @property
     def slipping(self) -> bool:

@@ -343,7 +343,7 @@ def _constants(sol: Solution) -> dict[str, Any]:
         mechanism = sol.manifest.mechanism
         even = mechanism is None or not mechanism.angle
         if even and speed != 0.0:  # rings that only swing against each other pass no ball
-            values = mean_speeds(sol.manifest, {**sol.parameters, **sol.constants}, sol.t)
+            values = mean_speeds(sol)
             frequencies = frequencies_of(bearing, values)
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law

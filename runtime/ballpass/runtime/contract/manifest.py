@@ -83,7 +83,7 @@ class CoordinateInfo:
 
     name: str
     velocity: str
-    kind: Literal["displacement", "angle"]
+    kind: Literal["displacement", "angle", "lag"]
     unit: str
     group: str
     partner: str

@@ -269,6 +269,9 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         /* a model at rest without load: any magnitude will do */
         if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;
         if (speed == 0.0) speed = position * turn / horizon;
+#ifdef BP_HAS_LAGS
+        if (bp_is_lag[k]) position = horizon / turn, speed = BP_RADIAN; /* a velocity that is an angle */
+#endif
         magnitude[k] = bp_rounded(position);
         magnitude[BP_NQ + k] = bp_rounded(speed);
     }

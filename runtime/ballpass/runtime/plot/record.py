@@ -163,7 +163,7 @@ class Record:
         bearing, mechanism = self.bearing, self.manifest.mechanism
         if bearing is None or (mechanism is not None and mechanism.angle):
             return None
-        return frequencies_of(bearing, mean_speeds(self.manifest, self._values, self.t))
+        return frequencies_of(bearing, mean_speeds(self.solution))
 
     def ball_angles(self, sample: int) -> Array:
         """Angles of the balls at a sample, (balls,) [rad]."""

@@ -12,19 +12,20 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, Manifest
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.point.jacobian import RHS, TIME, JacobianDirections, Rows, contract, directions_of, rows_of
+from ballpass.runtime.point.jacobian import RHS, JacobianDirections, Rows, contract, directions_of, rows_of
 from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -98,11 +99,17 @@ class StaticEquilibrium(Reported):
     load_is_given: bool = field(repr=False)
 
     def __repr__(self) -> str:
-        places = ", ".join(f"{name} {q:.4g} m" for name, q in zip(self.coordinates, self.positions, strict=True))
+        places = ", ".join(f"{name} {q:.4g} m" for name, q in self._found.items())
         return (
             f"StaticEquilibrium({self.model.manifest.scene} at t = {self.time:.6g} s: {places}; "
             f"peak ball force {self.peak_ball_force:.6g} N)"
         )
+
+    @property
+    def _found(self) -> dict[str, float]:
+        """Positions of the rings: the driver's angle is given [m]."""
+        held = held_coordinates(self.model).tolist()
+        return {n: q for n, q, no in zip(self.coordinates, self.positions.tolist(), held, strict=True) if not no}
 
     def _report(self) -> Report:
         positions = dict(zip(self.coordinates, self.positions.tolist(), strict=True))
@@ -116,7 +123,7 @@ class StaticEquilibrium(Reported):
             title=f"Static equilibrium at t = {self.time:.6g} s",
             heads=("position or ball", *right),
             rows=[
-                *((name, f"{1e6 * q:z.6g}") for name, q in positions.items()),
+                *((name, f"{1e6 * q:z.6g}") for name, q in self._found.items()),
                 *(
                     (f"ball {ball['ball']}", f"{1e6 * ball['deflection']:z.6g}", f"{ball['elastic_force']:z.6g}")
                     for ball in balls
@@ -207,31 +214,26 @@ class StaticEquilibrium(Reported):
 
 
 def _with_driver(model: LoadedModel, numbers: Numbers, t: float, names: Sequence[str]) -> JacobianDirections:
-    """Directions along which the driver moves as well, where its angle and speed are states.
+    """Directions along which the driver and the cages move as well, where their angles are states.
 
     Their derivatives by parameters and time are differences of closed forms.
     """
-    directions = directions_of(model, numbers, names, t)
-    held, mechanism = np.flatnonzero(held_coordinates(model)), model.manifest.mechanism
-    if not len(held) or mechanism is None:
+    directions, manifest = directions_of(model, numbers, names, t), model.manifest
+    if not np.any(held_coordinates(model)) or manifest.mechanism is None:
         return directions
-    driver_at, x = driver_angle.driver_at, directions.x.copy()
-    tables = [item for item in model.manifest.inputs if item.name == DRIVER_ACCELERATION]
-    used = dict.fromkeys(
-        [mechanism.start_angle, mechanism.speed, *(name for item in tables for name in (*item.times, *item.values))]
-    )
-    for column, name in enumerate(names):
-        at = t if name == TIME else numbers.values[name] if name in used else None
-        if at is None:
-            continue
+
+    def moved(at: float, states: Callable[[float], Array]) -> Array:
         step = DRIVER_STEP * (abs(at) or 1.0)
-        later, before = (
-            np.array(driver_at(model.manifest, numbers.values, at + side))
-            if name == TIME
-            else np.array(driver_at(model.manifest, {**numbers.values, name: at + side}, t))
-            for side in (step, -step)
-        )
-        x[[held[0], len(model.states) // 2 + held[0]], column] = (later - before) / (2.0 * step)
+        return np.asarray((states(at + step) - states(at - step)) / (2.0 * step))
+
+    def with_number(value: float, name: str) -> Array:
+        return driver_angle.held_states(manifest, model.numbers({**numbers.parameters, name: value}).values, t)
+
+    by_time = moved(t, lambda at: driver_angle.held_states(manifest, numbers.values, at))
+    x = by_time[:, None] * directions.t
+    for column, name in enumerate(names):
+        if name in numbers.parameters:
+            x[:, column] = moved(numbers.parameters[name], partial(with_number, name=name))
     return replace(directions, x=x)
 
 
@@ -275,8 +277,8 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
 
 
 def held_coordinates(model: LoadedModel) -> Array:
-    """Whether each coordinate keeps its initial place and speed while the rings come to rest: the driver's angle."""
-    return np.array([info.kind == "angle" for info in model.manifest.coordinates], dtype=bool)
+    """Whether each coordinate keeps its place and speed while the rings come to rest: the driver's angle, a lag."""
+    return np.array([info.kind != "displacement" for info in model.manifest.coordinates], dtype=bool)
 
 
 def static_equilibrium(
@@ -379,10 +381,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     extra[_loaded(model)] = applied - own
 
     held = held_coordinates(model)
-    start, velocity = np.zeros(half), np.zeros(half)
-    mechanism = model.manifest.mechanism
-    if mechanism is not None and mechanism.angle:
-        start[held], velocity[held] = driver_angle.driver_at(model.manifest, numbers.values, t)
+    start, velocity = np.split(driver_angle.held_states(model.manifest, numbers.values, t), 2)
 
     def force(q: Array) -> Array:
         there["x"] = np.concatenate([q, velocity])

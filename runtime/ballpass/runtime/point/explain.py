@@ -42,13 +42,16 @@ MANY_OSCILLATIONS = 5000.0
 #: Breakpoints that are named one by one; of more, the table of a load has most.
 MOST_NAMED = 12
 
+#: Inputs of a cage whose slip changes end with one of these.
+CAGE = ("cage.lag_rate", "cage.excess_slip")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Breakpoint:
     """A time of the first turn, or of as many as loads repeat after, at which a load switches or a table has a knot; of
     tables over time any of the run.
 
-    Time [s], driver angle [rad], which counts over these turns, and cause.
+    Time [s], driver angle [rad], which counts over these turns and is NaN where the motion decides it, and cause.
     """
 
     time: float
@@ -227,7 +230,8 @@ def _places(breakpoints: Sequence[Breakpoint], repeats: float) -> str:
     """Where the breakpoints are, those of tables over time behind the first turns by their time; of many, how many each
     load has."""
     places = [
-        f"{item.time:.4g} s" if item.time >= repeats else f"{math.degrees(item.angle):.4g}°" for item in breakpoints
+        f"{item.time:.4g} s" if item.time >= repeats or math.isnan(item.angle) else f"{math.degrees(item.angle):.4g}°"
+        for item in breakpoints
     ]
     if len(breakpoints) <= MOST_NAMED:
         return "; ".join(f"{at} {item.cause}" for at, item in zip(places, breakpoints, strict=True))
@@ -248,7 +252,9 @@ def _changing(model: LoadedModel, values: Mapping[str, float], turn: float) -> f
 
 def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, length: float) -> tuple[Breakpoint, ...]:
     found = []
-    inputs = model.manifest.inputs
+    inputs, mechanism = model.manifest.inputs, model.manifest.mechanism
+    driven = any(item.name == DRIVER_ACCELERATION for item in inputs)
+    known = mechanism is None or not mechanism.angle or driven
     # a little over the turn's end, so that an edge at t = 0 counts once
     times = driver_angle.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9))
     timed = driver_angle.rows_over_time(model.manifest, values, span * (1.0 - 1e-9), length)
@@ -260,7 +266,7 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, l
             for item, a, b in zip(inputs, before, behind, strict=True)
             if a != b and item.kind in ("gate", "table_rate")
         )
-        angle = _angle(model, values, float(time))
+        angle = _angle(model, values, float(time)) if known else math.nan
         found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
     return tuple(found)
 
@@ -278,6 +284,8 @@ def _knot(slope: str) -> str:
     """Words for a knot of the table whose slope is this input, as ``force.punch_slope`` or ``load.x_rate``."""
     if slope == DRIVER_ACCELERATION:
         return "row of the driver's table"
+    if slope.endswith(CAGE):
+        return "row of the cage's slip"
     kind, _, name = slope.rpartition("_")[0].partition(".")
     return f"knot of {'the load' if kind == 'load' else name}"
 
@@ -323,10 +331,12 @@ def _time_scales(
         decay = frequency = 0.0
         slowest = math.inf
         moved = (1.0 - held_coordinates(model)) * np.abs(x[:half])
+        # nothing moves the lag of a cage
+        moving = np.flatnonzero([info.kind != "lag" for info in model.manifest.coordinates] * 2)
         speed = math.sqrt(pull[k] * max(float(np.max(moved)), 1e-12))
         for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
             matrix = jacobian(model, numbers, "rhs", "states", t=time, x=np.concatenate([x[:half], x[half:] + kick]))
-            eigenvalues = np.linalg.eigvals(matrix)
+            eigenvalues = np.linalg.eigvals(matrix[np.ix_(moving, moving)])
             decay = max(decay, float(np.max(-eigenvalues.real)))
             slowest = min(slowest, float(np.min(np.abs(eigenvalues))))
             frequency = max(frequency, math.sqrt(float(np.max(np.abs(np.linalg.eigvals(matrix[half:, :half]))))))

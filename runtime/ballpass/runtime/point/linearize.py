@@ -259,7 +259,7 @@ def _faster_damping(
     found = damping.copy()
     for k, moved in enumerate(reach.tolist()):
         # the driver's speed is no vibration
-        if passing == 0.0 or moved == 0.0 or model.manifest.coordinates[k].kind == "angle":
+        if passing == 0.0 or moved == 0.0 or model.manifest.coordinates[k].kind != "displacement":
             continue
         found[:, k] = 0.0
         for side in (1.0, -1.0):

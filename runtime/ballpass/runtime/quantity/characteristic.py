@@ -18,6 +18,7 @@ from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.solution import Solution
 
 #: Multiples that are looked for: of ball passes, of these with sidebands, of the cage (more are ball passes); and the
 #: most shafts or cages to their sides.  With more of them everything would be something.
@@ -143,19 +144,29 @@ def characteristic_lines(
     return tuple(found)
 
 
-def mean_speeds(manifest: Manifest, values: Mapping[str, float], times: np.ndarray) -> Mapping[str, float]:
-    """The values with speeds of cages whose slip changes as means from the first to the last of the times [s].
+def mean_speeds(solution: Solution) -> Mapping[str, float]:
+    """Parameters and constants with speeds of cages whose slip changes as means over the samples.
 
-    They are those of the slip in the end, which a run need not reach.
+    They are those of the slip in the end, which a run need not reach.  Where the driver's speed changes they are those
+    at the initial one, means over its angle.
     """
-    found, ends = dict(values), times[[0, -1]]
+    manifest, mechanism, ends = solution.manifest, solution.manifest.mechanism, solution.t[[0, -1]]
+    found = {**solution.parameters, **solution.constants}
+    passed = float(ends[1] - ends[0])
+    if mechanism is not None and mechanism.angle and found[mechanism.speed] != 0.0:
+        first, last = solution[mechanism.angle][[0, -1]]
+        passed = float(last - first) / found[mechanism.speed]
     for bearing in manifest.bearings:
+        name = f"{bearing.prefix}cage.lag"
+        lags = np.zeros(2)
+        if name in solution.states:
+            lags = solution[name][[0, -1]]
         for item in manifest.inputs:
-            if item.name == f"{bearing.prefix}cage.lag" and ends[1] > ends[0]:
-                (first,), (last,) = driver_angle.inputs_over([item], values, ends, ends)
-                for name in (f"{bearing.path}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS)):
-                    if name in found:
-                        found[name] -= float((last - first) / (ends[1] - ends[0]))
+            if item.name == name:
+                lags = driver_angle.inputs_over([item], found, ends, ends)[:, 0]
+        for speed in (f"{bearing.path}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS)):
+            if speed in found and passed > 0.0:
+                found[speed] -= float(lags[1] - lags[0]) / passed
     return found
 
 

@@ -183,17 +183,26 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
 
 
 def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
-    """Mean rate at which a cage lags its speed in the end [rad/s], and its derivative; 0 where slip is constant."""
+    """Mean rate at which a cage lags its speed in the end [rad/s], and its derivative; 0 where slip is constant.
+
+    Of rings that turn evenly with the driver: no body swings.
+    """
     values, times = view.numbers.values, view.nodes.t
     for item in view.manifest.inputs:
-        if item.name == f"{bearing.prefix}cage.lag_rate":
+        if item.name in (f"{bearing.prefix}cage.lag_rate", f"{bearing.prefix}cage.excess_slip"):
             rows = np.searchsorted([values[name] for name in item.times], times, side="right")
             slopes = np.zeros((len(times), view.directions))
             for row in np.unique(rows).tolist():
                 here = rows == row
                 for _, name, amount in driver_angle.input_derivatives([item], values, float(times[here][0])):
                     slopes[here] += amount * view.slopes(name)
-            return view.mean(driver_angle.inputs_over([item], values, times, times)[:, 0], slopes)
+            mean, slope = view.mean(driver_angle.inputs_over([item], values, times, times)[:, 0], slopes)
+            if item.name.endswith("lag_rate"):
+                return mean, slope
+            turns, turning = f"{bearing.path}.rolling_turns", driver_angle.speed_name(view.manifest)
+            assert turning is not None  # of a linkage
+            faster = values[turns] * view.slopes(turning) + values[turning] * view.slopes(turns)
+            return mean * values[turns] * values[turning], slope * values[turns] * values[turning] + mean * faster
     return 0.0, np.zeros(view.directions)
 
 

@@ -271,7 +271,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
         values = envelope(solution.t, signal, band) if band else signal
         length = float(solution.t[-1] - solution.t[0])
         over_time = spectrogram(solution.t, values, segment=length / SEGMENTS, window=found.window)
-        numbers = mean_speeds(solution.manifest, {**solution.parameters, **solution.constants}, solution.t)
+        numbers = mean_speeds(solution)
         orders = characteristic_lines(solution.manifest, numbers, orders=True)
         speed = np.zeros(len(over_time.time))
         if orders:
@@ -370,7 +370,7 @@ def spectrum(
         run = replace(run, outputs={**run.outputs, of: _measured(run, of, sensor)})
     solution = run.steady()
     signal = solution[of]
-    numbers = mean_speeds(solution.manifest, {**solution.parameters, **solution.constants}, solution.t)
+    numbers = mean_speeds(solution)
     kurtosis = None
     if kurtogram:
         fastest = max((mark.frequency for mark in characteristic_lines(solution.manifest, numbers)), default=0.0)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, InputInfo, Manifest
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, BearingInfo, InputInfo, Manifest
 
 TURN = 2.0 * math.pi
 
@@ -112,6 +112,34 @@ def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, floa
             rates = np.interp(edges, times, speeds)
             return angle + float(np.trapezoid(rates, edges)), float(rates[-1])
     return angle, speed
+
+
+def lag_angle(manifest: Manifest, values: Values, bearing: BearingInfo, t: float) -> float:
+    """Angle by which a cage lags whose lag is a state; of rings that turn with the driver, without swing [rad]."""
+    assert manifest.mechanism is not None  # it has the driver
+    lag = manifest.initial[[info.name for info in manifest.states].index(f"{bearing.prefix}cage.lag")]
+    (item,) = (item for item in manifest.inputs if item.name == f"{bearing.prefix}cage.excess_slip")
+    times, heights = _knots(item, values)
+    edges = np.concatenate([times[:1], times[1:][times[1:] < t], [t]])
+    if manifest.mechanism.angle:
+        angles = np.array([driver_at(manifest, values, edge)[0] for edge in edges.tolist()])
+    else:
+        angles = values[manifest.mechanism.speed] * edges
+    slips = np.append(np.diff(heights) / np.diff(times), 0.0)[: len(edges) - 1]
+    return values[lag] + values[f"{bearing.path}.rolling_turns"] * float(slips @ np.diff(angles))
+
+
+def held_states(manifest: Manifest, values: Values, t: float) -> np.ndarray:
+    """States that no equilibrium decides, all else zero, shape (states,): the driver's by its table at a time, lags."""
+    names = [info.name for info in manifest.states]
+    found = np.zeros(len(names))
+    mechanism = manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        found[[names.index(mechanism.angle), names.index(mechanism.rate)]] = driver_at(manifest, values, t)
+    for bearing in manifest.bearings:
+        if f"{bearing.prefix}cage.lag" in names:
+            found[names.index(f"{bearing.prefix}cage.lag")] = lag_angle(manifest, values, bearing, t)
+    return found
 
 
 def turned_states(manifest: Manifest, values: Values, angles: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ moments that load it most.
 
 Coordinates that share a magnitude make a group, as the rings of a bearing do; some have a partner, as the other ring's
 coordinate along the same axis.  An angle, which grows as the driver turns, has the magnitude of a radian; moments are
-spread over a turn of it, it keeps its initial velocity, and stays where it is while an equilibrium is sought.
+spread over a turn of it, it keeps its initial velocity, and stays where it is while an equilibrium is sought.  So does
+the lag of a cage, a velocity that is an angle.
 
 The steps:
 
@@ -95,12 +96,14 @@ class Groups:
     ----------
     members : coordinates of each group
     partners : of each coordinate the one whose difference to it counts, -1 where there is none
-    angles : whether each coordinate is an angle
+    angles : whether each coordinate is an angle, or has a velocity that is one
+    lags : whether it is the latter
     """
 
     members: dict[str, np.ndarray]
     partners: np.ndarray
     angles: np.ndarray
+    lags: np.ndarray
 
     def apart(self, group: str, x: np.ndarray) -> float:
         """Largest difference between coordinates of a group and their partners."""
@@ -176,6 +179,8 @@ def _find_scales(
         # a model at rest without load: any magnitude will do
         position = position or speed * horizon / (2.0 * math.pi) or 1.0
         speed = speed or position * 2.0 * math.pi / horizon
+        if np.any(groups.lags[members]):
+            position, speed = horizon / (2.0 * math.pi), RADIAN
         magnitude[members], magnitude[half + members] = _rounded(position), _rounded(speed)
 
     decay = frequency = 0.0
@@ -277,7 +282,8 @@ def _groups(manifest: Manifest) -> Groups:
     return Groups(
         {str(group): np.flatnonzero(kinds == group) for group in dict.fromkeys(kinds)},
         np.array([names.index(info.partner) if info.partner else -1 for info in manifest.coordinates]),
-        np.array([info.kind == "angle" for info in manifest.coordinates]),
+        np.array([info.kind != "displacement" for info in manifest.coordinates], dtype=bool),
+        np.array([info.kind == "lag" for info in manifest.coordinates], dtype=bool),
     )
 
 

@@ -329,7 +329,7 @@ class _SpallContact:
                 self._symbol(name), each * (self.middle + past), "rad", f"{what} of the {place} of {words}", latex
             )
 
-        for k, (symbol, lag) in enumerate(self._lags, start=1):
+        for k, (symbol, lag) in enumerate(self._lags if passes.even else (), start=1):
             yield define(symbol, lag, "rad", f"Lag of the cage at {words}, row {k}", rf"\lambda_{{d,{k}}}")
 
     def depth(self, c: sp.Expr, s: sp.Expr, near: sp.logic.boolalg.Boolean) -> sp.Expr:

@@ -27,7 +27,7 @@ _DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$|_quantities$|^static_forces$
 #: Effects that no scene can ask for; listed to show the limits of the model.
 _NEVER = (
     "lubricant film and friction of the contacts",
-    "slip of the cage and of the balls; their inertia and centrifugal force",
+    "slip of the balls; their inertia and centrifugal force",
     "axial motion and tilting of the rings",
     "elasticity of the mechanism's bodies and of the rings themselves",
 )
@@ -157,7 +157,7 @@ def _absent(scene: Scene) -> list[str]:
             out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
         if bearing.outer is None:
             out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')
-        if bearing.coupling == "one-way" and not (bearing.cage and bearing.cage.slipping):
+        if not (bearing.cage and bearing.cage.slipping):
             out.append(f"slip of the cage ({path}.cage.slip)")
         present = {effect.kind for effect in bearing.effects}
         out += [f"{effect.words} ({path}.{kind})" for kind, effect in EFFECTS.items() if kind not in present]
