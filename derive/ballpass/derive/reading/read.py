@@ -280,7 +280,9 @@ def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Seq
     counts = [law.turns for law in laws if isinstance(law, AngleTable)]
     if shaft is not None and shaft.speed.value != 0.0:
         for law in (load.law for load in loads):
-            ratio = math.tau * law.frequency.value / abs(shaft.speed.value) if isinstance(law, HarmonicLoad) else math.nan
+            ratio = (
+                math.tau * law.frequency.value / abs(shaft.speed.value) if isinstance(law, HarmonicLoad) else math.nan
+            )
             if math.isfinite(ratio):  # a number with a fault has none
                 near = Fraction(ratio).limit_denominator(MOST_TURNS)
                 counts += [near.denominator] if math.isclose(near, ratio, rel_tol=1e-9) else []
