@@ -69,7 +69,9 @@ def parse_quantities(manifest: Manifest, names: Sequence[str]) -> tuple[Quantity
         As `refuse_unknown_kinds`; then what the manifest does not have.  All faults at once.
     """
     refuse_unknown_kinds(names)
-    return tuple(_all_at_once(lambda name: parse_quantity(manifest, name), dict.fromkeys(names)))
+    channels = channels_of(manifest)
+    known = _names(manifest, channels)
+    return tuple(_all_at_once(lambda name: _parsed(manifest, channels, known, name), dict.fromkeys(names)))
 
 
 def refuse_unknown_kinds(names: Iterable[str]) -> None:
@@ -99,8 +101,13 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
         No such kind, output, ball or place; the message has the nearest known names.
     """
     channels = channels_of(manifest)
+    return _parsed(manifest, channels, _names(manifest, channels), text)
+
+
+def _parsed(
+    manifest: Manifest, channels: Mapping[str, tuple[int, str]], names: Mapping[str, tuple[Kind, str]], text: str
+) -> Quantity:
     whole, _, place = str(text).partition("@")
-    names = _names(manifest, channels)
     if whole in names:
         kind, channel = names[whole]
         _check_place(manifest, text, kind, place)
