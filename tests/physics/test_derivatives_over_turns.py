@@ -177,3 +177,34 @@ def test_gradients_of_quantities_are_those_of_differences(
             assert abs(gradient[row, column] - pair.check.value) < 2.0 * AGREEMENT * size, (quantity, name)
     # most: differences of what is small over turns of a spall are known to 2e-3 at best
     assert compared >= 0.6 * len(of) * len(names)
+
+
+@pytest.mark.long
+def test_derivatives_behind_spalls_are_known_to_a_fraction_of_what_they_are_within_them(
+    make_model: Callable[..., Model],
+) -> None:
+    """A thousandth is left of them, and so would be of digits at a tolerance relative to the largest."""
+    spall = """[bearing.cage]
+slip = { time = { values = [0.0, 0.08, 0.21], unit = "s" }, value = [0.0, 0.04, 0.015] }
+[bearing.inner_waviness.5]
+amplitude = "0.4 um"
+[bearing.defects.spall]
+on = "inner"
+angle = "77 deg"
+chord = "1.1 mm"
+depth = "4 um"
+profile = "half-sine"
+[bearing.inner_ring]"""
+    model = make_model("varying_compliance", ("[bearing.inner_ring]", spall))
+    asked = {"cycles": 2.67, "transient": 0.0}
+    found = model.sensitivity("rms:inner.vx", ANGLE, **asked, check=False).pairs[0].derivative  # type: ignore[arg-type]
+    function = QuantityFunction(model, "rms:inner.vx", ANGLE, **asked)  # type: ignore[arg-type]
+
+    def run(change: float) -> np.ndarray:
+        parameters = {ANGLE: model.parameters[ANGLE] + change}
+        tight = {"rtol": 1e-12, "kinks": "located", "method": "stepper-dop853"}
+        return np.array(model.reduce(2.67, transient=0, parameters=parameters, **tight)["inner.vx"].rms)  # type: ignore[arg-type]
+
+    expected = float(extrapolated(run, 2e-5))
+    assert found == pytest.approx(expected, rel=5e-5, abs=0.0)
+    assert float(function.jacobian(function.start).ravel()[0]) == pytest.approx(expected, rel=5e-5, abs=0.0)

@@ -56,7 +56,7 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
         other = None if fewer is None else _mean_within(view, quantity, fewer)[0]
         if other is None or abs(other - value) > _LESS * abs(value):
             kink = (
-                "the run ends with a whole turn, and at a lower speed it holds one less, whose work differs: the value "
+                "the run ends with a whole turn, and at a lower speed it holds one less, whose work differs; the value "
                 "jumps there, and differences are not of it; the derivative given is that towards higher speeds. Ask "
                 "for turns (cycles), not for a time"
             )
