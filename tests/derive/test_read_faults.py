@@ -143,7 +143,7 @@ REFUSED = [
     ("cycles = 4 ", 'duration = "1 s"\ncycles = 4 ', "run", "delete one"),
     ("cycles = 4 ", "cycles = 0 ", "run.cycles", "positive"),
     ('speed = "500 rpm"', 'speed = "0 rpm"', "run.cycles", "duration"),
-    ("transient_cycles = 2", "transient_cycles = 4", "run.transient_cycles", "run more cycles"),
+    ("transient_cycles = 2", "transient_cycles = 4", "run.transient_cycles", "run longer"),
     ("transient_cycles = 2", "transient_cycles = -1", "run.transient_cycles", "write 0"),
     ("cycles = 4 ", 'duration = "0.2 s" ', "run.transient_cycles", "run longer"),
     ("samples_per_cycle = 2000", "samples_per_cycle = 15", "run.samples_per_cycle", "2000"),

@@ -241,7 +241,7 @@ class Model(PointModel, Questions):
             transient_cycles=transient,
             kinks=kinks,
         )
-        refuse_with_error(kinks, error)
+        refuse_with_error(error, method=method, rtol=rtol, kinks=kinks)
         with shown("simulating", progress) as tell:
             request = replace(request, progress=tell)
             if error is None:

@@ -298,14 +298,6 @@ def _read_run(table: Table, steady: int) -> tuple[RunSettings, tuple[str, ...]]:
         if run.cycles is None and run.duration is None:
             dropped = run.transient_cycles if "transient_cycles" in table.data else DROPPED_CYCLES
             run = replace(run, cycles=dropped + steady, transient_cycles=dropped)
-        if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:
-            table.fault(
-                "transient_cycles",
-                "the transient cycles fill the whole run",
-                given=f"{run.transient_cycles:g} of {run.cycles:g} cycles",
-                allowed="fewer than cycles",
-                remedy="run more cycles, or drop fewer",
-            )
         return run, read_keys(table, {"outputs": OUTPUTS})["outputs"]
 
 

@@ -296,25 +296,23 @@ def _check_preload(checker: Checker, bearing: Bearing) -> None:
 
 def _check_run(checker: Checker, scene: Scene) -> None:
     source = scene.mechanism.driver if scene.mechanism is not None else scene.shaft
-    if source is None:
-        return
-    run, speed = scene.run, source.speed
-    if speed.value == 0.0 and run.cycles is not None:
+    run, within = scene.run, ""
+    turns = run.cycles if (run.cycles or 0.0) > 0.0 else None
+    if source is not None and source.speed.value == 0.0 and run.cycles is not None:
         checker.fault(
             "run.cycles",
             "nothing turns, so there are no cycles",
-            f"{speed.path} = {checker.show(speed)}",
+            f"{source.speed.path} = {checker.show(source.speed)}",
             "a duration where the speed is zero",
             'write duration = "0.5 s" instead of cycles (or run with --duration "0.5 s"), or give a speed',
         )
-    if run.duration is None or not run.transient_cycles > 0.0:
-        return
-    turns = run.duration * abs(speed.value) / math.tau
-    if turns <= run.transient_cycles:
+    if source is not None and run.duration is not None:
+        turns, within = run.duration * abs(source.speed.value) / math.tau, f" in {run.duration:g} s"
+    if turns is not None and turns <= run.transient_cycles and run.transient_cycles > 0.0:
         checker.fault(
             "run.transient_cycles",
             "the transient cycles fill the whole run",
-            f"{run.transient_cycles:g} cycles of {turns:g} in {run.duration:g} s",
+            f"{run.transient_cycles:g} of {turns:g} cycles{within}",
             "fewer cycles than the run has",
             "run longer, or drop fewer cycles (--transient 0)",
         )

@@ -76,6 +76,15 @@ MOVED, STARTS = 1e-12, 8
 CHAOS_REFERENCE, CHAOTIC = MethodChoice(method="stepper", rtol=1e-10, kinks=LOCATED), 1e-4
 
 
+def checked_target(error: float) -> float:
+    """A relative error within the bounds [1]; RequestError for another."""
+    if not SMALLEST <= real(error) <= LARGEST:
+        raise RequestError(
+            f"error: {error!r:.80} is not a relative error from {SMALLEST:g} to {LARGEST:g}. Example: 0.01 for 1 %."
+        )
+    return real(error)
+
+
 class TargetMissed(SimulationError):
     """No way meets the target; ``best`` is the most accurate one, None where nothing could be integrated."""
 
@@ -92,15 +101,10 @@ def simulate_to_error(
     Raises
     ------
     RequestError
-        A wrong request: method or tolerance named besides, a model without states, unknown quantities.
+        A wrong request: a model without states, unknown quantities.
     TargetMissed
         No way meets the target.
     """
-    if request.method is not None or request.rtol is not None:
-        raise RequestError(
-            "error was given, and method or rtol as well: with an error named, the tool chooses both. Give one or the "
-            "other."
-        )
     if not model.states:
         raise RequestError("This model has no states; its outputs follow from time alone, without an error.")
     quantities = compared_quantities(model, of)
@@ -142,12 +146,7 @@ def meet_target(run: Run, target: float, quantities: Sequence[Quantity]) -> Accu
     TargetMissed
         No way meets the target, or the motion is chaotic; the message says what the best one keeps.
     """
-    if not SMALLEST <= real(target) <= LARGEST:
-        raise RequestError(
-            f"The error asked for is {target!r:.80}. Allowed: a relative error from {SMALLEST:g} to {LARGEST:g}. "
-            "Example: error=0.01 for 1 %."
-        )
-    target, names = real(target), tuple(item.name for item in quantities)
+    target, names = checked_target(target), tuple(item.name for item in quantities)
     search = _Search(run=run, quantities=QuantityRun(run.model, quantities, motion=True))
     tried: list[tuple[str, float]] = []
     best: Accuracy | None = None

@@ -101,12 +101,13 @@ def check_located(asked: str, method: str) -> Kinks:
     return chosen
 
 
-def refuse_with_error(kinks: str | None, error: object) -> None:
-    """Raise `RequestError` where kinks are chosen for a run to a named error."""
-    if kinks is not None and error is not None:
+def refuse_with_error(error: object, **chosen: object) -> None:
+    """Raise `RequestError` where method, tolerance or kinks, by name, are chosen for a run to a named error."""
+    given = {name: value for name, value in chosen.items() if value is not None}
+    if error is not None and given:
         raise RequestError(
-            f"kinks = {kinks!r} and an error were both given: a run to a named error chooses its own way. Leave kinks "
-            "out, or name method and rtol instead of the error."
+            f"{', '.join(f'{name} = {value!r}' for name, value in given.items())} and an error were both given: a run "
+            f"to a named error chooses its own way. Leave {' and '.join(given)} out, or the error."
         )
 
 

@@ -119,6 +119,12 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
     return on_request(name) or f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 
 
+def refuse_two_lengths(cycles: float | None, duration: float | None) -> None:
+    """Raise `RequestError` where both turns and a time [s] are given."""
+    if cycles is not None and duration is not None:
+        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+
+
 def asked_length(model: LoadedModel, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
     """Turns or time [s] to run, one of them None: as given, else from the model's run settings.
 
@@ -127,8 +133,7 @@ def asked_length(model: LoadedModel, cycles: float | None, duration: float | Non
     RequestError
         Both were given, or one is not a number above 0.
     """
-    if cycles is not None and duration is not None:
-        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+    refuse_two_lengths(cycles, duration)
     if cycles is None and duration is None:
         cycles, duration = model.run_settings.cycles, model.run_settings.duration
     if cycles is not None:

@@ -68,7 +68,7 @@ def animate(
             from ballpass.runtime.plot.animate import count_pictures
 
             count_pictures(f".{format_}", last, pictures)  # impossible requests: refused before the simulation
-        asked = read_asked(scene, set_, duration, transient)
+        asked = read_asked(scene, set_, cycles, duration, transient)
         path = results_file(out, scene, f"animation.{format_}", MOVING)
         unknown = partial(refuse_unknown, options_in({"bearing": Shown}), {"bearing": bearing})
         model = load_model(scene, stages, asked.method, None, rtol, overrides=asked.overrides, inspect=unknown)

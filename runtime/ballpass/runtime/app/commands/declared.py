@@ -39,6 +39,9 @@ from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
 
+#: Parameters of a question that say how long to run.
+LENGTH = ("cycles", "duration", "transient")
+
 
 class Command(TyperCommand):
     """A command that asks for what is missing as for everything else: what, what is allowed, what to write."""
@@ -265,7 +268,7 @@ def _transient(
     from ballpass.runtime.app.transient_words import warnings_of_transient
 
     found = {} if question.steady is True else question.steady(answer)
-    length = {name: values.get(name) for name in ("cycles", "duration", "transient")}
+    length = {name: values.get(name) for name in LENGTH}
     return warnings_of_transient(model, {**overrides, **found}, **length)
 
 
@@ -294,7 +297,7 @@ def _source(
         if set_:
             raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")
         return load_solution(scene), {}
-    asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
+    asked = read_asked(scene, set_, *(values.get(name) for name in LENGTH if LENGTH[0] in values))
     method = (values.get("method") or asked.method) if question.runs else "none"
     needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
     model = load_model(

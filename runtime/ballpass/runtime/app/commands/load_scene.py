@@ -41,9 +41,13 @@ class Asked:
 
 
 def read_asked(
-    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
+    path: Path,
+    settings: list[str] | None,
+    cycles: float | None = None,
+    duration: float | None = None,
+    transient: float | None = None,
 ) -> Asked:
-    """Read a scene with ``--set``, ``--duration`` [s] and ``--transient`` [turns] applied.
+    """Read a scene with ``--set``, ``--cycles``, ``--duration`` [s] and ``--transient`` [turns] applied.
 
     Where the generated folder is fresh its manifest has all that is needed; else, and where something is wrong, the
     scene is read, so that the message has the line of the file.  A generated folder may stand in place of the scene.
@@ -57,7 +61,7 @@ def read_asked(
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
         return Asked(method=manifest.run.method, overrides=overrides)
-    _, scene, overrides = read_with_settings(path, settings, duration, transient)
+    _, scene, overrides = read_with_settings(path, settings, cycles, duration, transient)
     return Asked(method=scene.run.method, overrides=overrides)
 
 
@@ -120,7 +124,11 @@ def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float
 
 
 def read_with_settings(
-    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
+    path: Path,
+    settings: list[str] | None,
+    cycles: float | None = None,
+    duration: float | None = None,
+    transient: float | None = None,
 ) -> tuple[Scene, Scene, dict[str, float]]:
     """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
     if path.is_dir():
@@ -131,6 +139,7 @@ def read_with_settings(
     from ballpass.derive import SceneError, read_scene
     from ballpass.derive.reading.read import parse_override, with_values
     from ballpass.derive.scene.errors import Fault
+    from ballpass.runtime.run.request import refuse_two_lengths
 
     read = read_scene(path)
     faults: list[Fault] = []
@@ -158,14 +167,17 @@ def read_with_settings(
     if faults:
         raise SceneError(faults, source="--set")
     run = read.run
-    if duration is not None:
-        dropped = run.transient_cycles if transient is None else transient
-        run = replace(run, cycles=None, duration=duration, transient_cycles=dropped)
-    asked = replace(read, run=run)
+    refuse_two_lengths(cycles, duration)
+    if cycles is not None or duration is not None:
+        run = replace(run, cycles=cycles, duration=duration)
+    if transient is not None:
+        run = replace(run, transient_cycles=transient)
+    if run is read.run and not overrides:
+        return read, read, overrides
     try:
-        return read, with_values(asked, overrides) if overrides else asked, overrides
+        return read, with_values(replace(read, run=run), overrides), overrides
     except SceneError as error:
-        raise SceneError(error.faults, source="--set") from None
+        raise SceneError(error.faults, source="--set" if overrides else "options") from None
 
 
 def read_formats(given: Sequence[str] | None) -> tuple[str, ...]:

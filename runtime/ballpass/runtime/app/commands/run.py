@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -75,14 +74,14 @@ LARGE = 200_000_000
 
 def relative_error(text: str) -> float:
     """A relative error from a text: 1%, 1 %, 0.01; RequestError for another."""
+    from ballpass.runtime.certify.error_target import checked_target
+
     number, mark = text.strip().removesuffix("%").strip(), text.strip().endswith("%")
     try:
         value = float(number) / (100.0 if mark else 1.0)
     except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise RequestError(f"{text!r} is not a relative error. Allowed: a number above 0 as 1% or 0.01.")
-    return value
+        raise RequestError(f"{text!r} is not a relative error. Allowed: a number above 0 as 1% or 0.01.") from None
+    return checked_target(value)
 
 
 def run(
@@ -145,12 +144,15 @@ def run(
         from ballpass.runtime.ask.peaks import run_of
         from ballpass.runtime.report.report import Report
         from ballpass.runtime.report.text import show as show_report
+        from ballpass.runtime.run.locating import refuse_with_error
         from ballpass.runtime.run.settle import look_further
 
         stages("read")
         formats = read_formats(format_)
-        asked = read_asked(scene, set_, duration, transient)
+        refuse_with_error(error, method=method, rtol=rtol, kinks=kinks)
         start = _read_start(initial)
+        # the transient of a run that goes on counts from the start of the first
+        asked = read_asked(scene, set_, cycles, duration, transient if initial in (None, "equilibrium") else 0.0)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
         needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")

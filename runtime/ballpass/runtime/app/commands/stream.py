@@ -36,7 +36,7 @@ def stream(
     """Simulate into a file, piece by piece, for any length; ballpass spectrum and ballpass run --initial read it."""
     with command(scene) as stages:
         stages("read")
-        asked = read_asked(scene, set_, duration)
+        asked = read_asked(scene, set_, cycles, duration, 0.0)
         unknown = partial(refuse_unknown, options_in({"of": Of}), {"of": of})
         model = load_model(scene, stages, asked.method, None, rtol, overrides=asked.overrides, inspect=unknown)
         stages("simulate")

@@ -131,11 +131,13 @@ def sweep(
     with command(scene) as stages:
         stages("read")
         source: Scene | Manifest
+        # how many turns a duration is, members with other speeds decide
+        length = (cycles, None, transient) if duration is None else ()
         if scene.is_dir():
-            source, overrides = read_manifest(scene), read_asked(scene, set_, duration, transient).overrides
+            source, overrides = read_manifest(scene), read_asked(scene, set_).overrides
             usual = source.run.method
         else:
-            read, source, overrides = read_with_settings(scene, set_, duration, transient)
+            read, source, overrides = read_with_settings(scene, set_, *length)
             usual = read.run.method
         ranges = read_ranges(source, vary or [], overrides)
         folder = results_folder(out, scene)
