@@ -50,6 +50,7 @@ from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
+from ballpass.runtime.contract.arguments import typed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -134,6 +135,7 @@ class System:
         return (*positions, *velocities)
 
 
+@typed
 def derive(scene: Scene) -> System:
     """Derive the equations of a scene.
 

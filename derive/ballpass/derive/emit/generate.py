@@ -26,6 +26,7 @@ from ballpass.derive.emit.signature import (
     source_key,
 )
 from ballpass.runtime.contract import manifest as mf
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.folder import file_digest, read_manifest, write_manifest
 from ballpass.runtime.contract.folders import locked, replace_files
@@ -64,6 +65,7 @@ class FolderCheck:
     stale: tuple[str, ...]
 
 
+@typed
 def generate(
     scene: str | Path | Scene,
     out: str | Path | None = None,
@@ -131,6 +133,7 @@ def generate(
     return folder
 
 
+@typed
 def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderCheck:
     """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
 

@@ -26,6 +26,7 @@ from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.show.short import ShortRepr
 
 #: What no compiled run calls.
@@ -68,6 +69,7 @@ class LoweredFunctions(ShortRepr):
         raise KeyError(name)
 
 
+@typed
 def lower(
     system: System, *, extra: Mapping[str, Mapping[str, sp.Expr]] | None = None, derivatives: bool = True
 ) -> LoweredFunctions:

@@ -47,6 +47,7 @@ from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.folders import read_file
 
 T = TypeVar("T", Bearing, Load)
@@ -67,6 +68,7 @@ STEADY_CYCLES, DROPPED_CYCLES = 10, 50.0
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
 
+@typed
 def read_scene(
     path: str | Path,
     coupling: Coupling | None = None,
@@ -108,7 +110,9 @@ def read_scene(
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise _unreadable(file, "the file is not text in UTF-8", "save the file as UTF-8", line) from None
-    return _scene(text, name or file.stem, str(file), coupling, changes or {})
+    return _scene(
+        text, name or file.stem, str(file), coupling, {str(key): item for key, item in (changes or {}).items()}
+    )
 
 
 def scene_from_text(text: str, name: str) -> Scene:

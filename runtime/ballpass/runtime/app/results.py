@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import file_digest
 from ballpass.runtime.contract.folders import read_whole, replace_files
@@ -77,6 +78,7 @@ def write_results(
     return summary, sorted((*summary[FILES], SUMMARY))
 
 
+@typed
 def load_results(folder: str | Path) -> Results:
     """Read what ``ballpass run`` wrote into a folder.
 

@@ -9,7 +9,7 @@ import functools
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, TypeVar, cast
 
@@ -30,6 +30,15 @@ _EXPECTED = {
     "Mapping[str, Any]": _MAPPING,
     "Mapping[str, float]": _MAPPING,
     "Mapping[str, str]": _MAPPING,
+    "Mapping[str, Mapping[str, Expr]]": _MAPPING,
+    "str | Path | Scene": "a path or a scene",
+    "Scene": "a scene that `read_scene` gave",
+    "System": "a system that `derive` gave",
+    "Coupling": '"one-way" or "two-way"',
+    "Sequence[SignalClass]": "signal classes in a list",
+    "Signals": "what is recorded, as Signals",
+    "Callable[[str], None]": "a function that takes words",
+    "Callable[[Manifest], None]": "a function that takes a manifest",
     "LoadedModel": "a model that `load` gave",
     "Solution": "a solution of a run",
     "Sensor": "a sensor",
@@ -59,13 +68,17 @@ _EXAMPLES = {
 
 def type_fault(name: str, annotation: str, value: Any) -> str | None:
     """Why a value is none of what an annotation says; None where it is one, or the annotation is of another kind."""
-    kind = re.sub(r"\b(?:\w+\.)+", "", annotation)  # without modules
+    kind = _without_modules(annotation)
     optional = kind.removesuffix(" | None")
     expected = _EXPECTED.get(optional)
     if expected is None or (value is None and optional != kind) or _fits(expected, optional, value):
         return None
     example = f" Example: {name}={_EXAMPLES[name]}." if name in _EXAMPLES else ""
     return f"{name}: {expected} is expected, not {value!r:.60} ({type(value).__name__}).{example}"
+
+
+def _without_modules(annotation: str) -> str:
+    return re.sub(r"\b(?:\w+\.)+", "", annotation)
 
 
 def _fits(expected: str, kind: str, value: Any) -> bool:
@@ -79,7 +92,16 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
         # an empty one would be the working directory
         return isinstance(value, str | os.PathLike) and value != ""
     if expected == _MAPPING:
-        return isinstance(value, Mapping)
+        nested = kind.startswith("Mapping[str, Mapping")
+        return isinstance(value, Mapping) and all(isinstance(item, Mapping) for item in value.values() if nested)
+    if kind == "str | Path | Scene":
+        return _fits(_PATH, "str | Path", value) or _fits(expected, "Scene", value)
+    if kind.startswith("Sequence["):
+        return isinstance(value, Sequence) and all(_fits(expected, kind[9:-1], item) for item in value)
+    if kind == "Coupling":
+        return isinstance(value, str)
+    if kind.startswith("Callable[") and "True" not in expected:
+        return callable(value)
     if kind == "bool":
         return isinstance(value.item() if getattr(value, "shape", None) == () else value, bool)
     if "True, False or None" in expected:
@@ -96,7 +118,8 @@ def is_number(value: object) -> bool:
 
 def typed(function: _Function) -> _Function:
     """The function that first refuses arguments of a wrong type with a `RequestError`, as a decorator."""
-    kinds = {name: kind for name, kind in function.__annotations__.items() if name != "return" and kind in _KINDS}
+    written = {name: _without_modules(kind) for name, kind in function.__annotations__.items() if name != "return"}
+    kinds = {name: kind for name, kind in written.items() if kind in _KINDS}
     if not kinds:
         return function
     arguments = inspect.signature(function)

@@ -7,6 +7,7 @@ import importlib.metadata
 from dataclasses import replace
 from pathlib import Path
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.folders import read_file, read_whole, replace_file
 from ballpass.runtime.contract.manifest import FILE_NAME, Manifest
@@ -49,6 +50,7 @@ def _check_version(folder: str | Path, manifest: Manifest) -> None:
         )
 
 
+@typed
 def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     """Read ``manifest.json`` of a generated folder.
 

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked, refuse_full_disk
@@ -137,6 +138,7 @@ class _DataSetTable:
         return Member(kind=kind, place=place, parameters=numbers, snr=snr)
 
 
+@typed
 def make_data_set(
     path: str | Path,
     classes: Sequence[SignalClass],

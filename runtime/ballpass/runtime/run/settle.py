@@ -107,7 +107,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     turns = driver_angle.whole_cycles(numbers.values, LEAST)
-    if not (real(most) >= 2 * turns and int(most) == most):
+    if not (real(most) >= 2 * turns and float(most).is_integer()):
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.")
     transient = asked_transient(model, request.transient_cycles)
     turn = driver_angle.period(model.manifest, numbers.values)

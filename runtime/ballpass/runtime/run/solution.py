@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
@@ -287,6 +288,7 @@ class Solution:
         table.attrs["units"] = units
         return table
 
+    @typed
     def save(self, path: str | Path) -> Path:
         """Write NetCDF-4: the old file or the new one, never half of it.  `load_solution` reads it back.
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.manifest import Manifest
@@ -21,6 +22,7 @@ from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.solution import FILE_SCHEMA, Solution, Statistics
 
 
+@typed
 def load_solution(path: str | Path) -> Solution:
     """Read a solution that `Solution.save` wrote.
 
