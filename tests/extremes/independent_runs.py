@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from ballpass.runtime import IntegrationError, Model, Solution, Status
+from ballpass.runtime import Model
 from ballpass.runtime.point.evaluate import neighbour
 
 Array = NDArray[np.float64]
@@ -33,16 +32,6 @@ ROUGH, PARTS = 1e-9, 64
 
 #: Points and rounds of the grids around an extreme, and around how many nodes.
 GRID, ROUNDS, CANDIDATES = 33, 4, 4
-
-
-def even_if_void(model: Model, **request: Any) -> Solution:
-    """A run, also where its rings moved as they do in no bearing: what is compared here is the computation."""
-    try:
-        return model.simulate(**request)
-    except IntegrationError as fault:
-        if fault.status is not Status.VOID:
-            raise
-        return fault.partial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

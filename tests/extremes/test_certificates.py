@@ -15,7 +15,6 @@ from ballpass.runtime.certify.certificate import Verdict
 pytestmark = pytest.mark.extreme
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("number", [2, 4])
 def test_what_is_verified_is_so(make_model: Callable[..., Model], number: int, holds: Callable[..., None]) -> None:
     """What a certificate calls verified agrees with differences of SciPy's runs."""
@@ -27,13 +26,11 @@ def test_what_is_verified_is_so(make_model: Callable[..., Model], number: int, h
     holds(max(abs(row.pair.derivative - row.truth.value) / row.allowed for row in verified if row.allowed > 0.0), 1.0)
 
 
-@pytest.mark.long
 def test_integrals_of_ball_forces_are_right(make_model: Callable[..., Model], holds: Callable[..., None]) -> None:
     """Integrals over the balls' forces, which begin and end in contact, have right derivatives by a groove radius."""
     query = Query(
         parameters={"mechanism.driver.start_angle": math.radians(235.0)},
         cycles=0.06,
-        samples=16,
         of=("rms:ball.elastic_force", "mean:ball.elastic_force[3]", "mean:outer.y"),
         wrt=("bearing.contact.inner_groove_radius",),
     )

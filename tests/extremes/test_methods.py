@@ -22,9 +22,9 @@ pytestmark = pytest.mark.extreme
 Holds = Callable[..., None]
 Press = Callable[..., Model]
 
-STEPPERS = ("stepper", *(pytest.param(name, marks=pytest.mark.long) for name in NAMES))
+STEPPERS = ("stepper", *NAMES)
 #: CasADi's integrator, in its virtual machine.
-CASADI = pytest.param("cvodes", marks=pytest.mark.long)
+CASADI = "cvodes"
 
 #: Law, numbers, part of a turn, SciPy's method and tolerance.
 CASES = {
@@ -49,7 +49,7 @@ def expected(press: Press) -> Callable[[str], np.ndarray]:
     return states
 
 
-@pytest.mark.parametrize("kind", ["stiffest", pytest.param("no damping", marks=pytest.mark.long)])
+@pytest.mark.parametrize("kind", ["stiffest", "no damping"])
 @pytest.mark.parametrize("method", [*STEPPERS, CASADI])
 def test_every_method(
     press: Press, holds: Holds, expected: Callable[[str], np.ndarray], kind: str, method: str

@@ -27,6 +27,7 @@ from replacements import (
     SPEED,
     START,
     STRETCHED,
+    STRONG,
     TINY,
     TURN,
     WINDOW,
@@ -105,12 +106,12 @@ BALANCED = {
 THROUGH_ZERO = {f"{WINDOW}.start": math.radians(350.0), f"{WINDOW}.end": math.radians(10.0), START: math.radians(340.0)}
 #: Words, numbers, replacements in the scene, options of the comparison.
 NUMBERS: tuple[tuple[str, dict[str, float], tuple[Change, ...], dict[str, Any]], ...] = (
-    ("15 000 rpm", {SPEED: 15_000 * TURN / 60.0}, (), {}),
+    ("15 000 rpm", FAST, (), {}),
     ("1 rpm, 15 ms", {SPEED: TURN / 60.0, START: math.radians(236.98)}, (), {"duration": 15e-3}),
     ("5000 rpm clockwise", {SPEED: -5000.0 * TURN / 60.0, START: math.radians(270.0)}, (), {}),
     ("punch 0 N", {PUNCH: 0.0}, (), {}),
     ("punch 1 mN", {PUNCH: 1e-3}, (), {}),
-    ("punch 300 kN", {PUNCH: 3e5}, (), {}),
+    ("punch 300 kN", {PUNCH: STRONG}, (), {}),
     ("clearance -30 um", {CLEARANCE: -30e-6}, (), {}),
     ("clearance 1 mm", {CLEARANCE: 1e-3}, (), {"bound": 1e-3}),
     ("outer ring 1 mg", {f"{OUTER}.mass": 1e-6, START: math.radians(236.0)}, (), {**STIFF, "turns": 0.02}),
@@ -128,7 +129,7 @@ NUMBERS: tuple[tuple[str, dict[str, float], tuple[Change, ...], dict[str, Any]],
     ("contact damping 0", {RATIO: 0.0}, (), {}),
     ("crank 5 um, rod 83 um", TINY, (), {}),
     ("crank 5 m, rod 83 m", {CRANK: 5.0, ROD: 5.0 / 0.06, ROD_CENTER: 5.0 / 0.12}, (), {}),
-    ("crank over rod 0.9999, 60 rpm", {**STRETCHED, SPEED: TURN}, (), {"turns": 0.05}),
+    ("crank over rod 0.9999", STRETCHED, (), {"turns": 0.05}),
     ("start at bottom dead centre", {START: math.radians(270.0)}, (), {}),
     ("start at top dead centre", {START: math.radians(90.0)}, (), {}),
     ("crank balanced to the far side", BALANCED, GIVEN_MASS, {}),
@@ -157,9 +158,9 @@ def test_press_moves_as_the_one_written_by_hand(
 
 #: Where a ball is flattened by more than a tenth: words, numbers, part of a turn.
 VOID = (
-    ("60 000 rpm", FAST, 0.15),
+    ("60 000 rpm", {SPEED: 60_000 * TURN / 60.0}, 0.15),
     ("punch 1 MN", {PUNCH: 1e6}, 0.05),
-    ("crank over rod 0.9999", STRETCHED, 0.05),
+    ("crank over rod 0.9999, 500 rpm", {**STRETCHED, SPEED: 500 * TURN / 60.0}, 0.05),
     ("balls of 0.5 mm", of_size(0.5e-3), 0.15),
 )
 
@@ -185,8 +186,8 @@ LAWS = ("none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent")
 CRITICAL = 20.0
 #: Words, numbers, part of a turn: across 1 mm each impact amplifies differences.
 EXTREMES = (
-    ("15 000 rpm", {SPEED: 15_000 * TURN / 60.0}, 0.15),
-    ("punch 300 kN", {PUNCH: 3e5}, 0.05),
+    ("15 000 rpm", FAST, 0.15),
+    ("punch 300 kN", {PUNCH: STRONG}, 0.05),
     ("clearance -30 um", {CLEARANCE: -30e-6}, 0.05),
     ("clearance 1 mm", {CLEARANCE: 1e-3}, 0.022),
 )

@@ -199,12 +199,12 @@ SCENES = (
     *("punching_press", "punching_press_hinges", "punching_press_motor", "punching_press_two_way", "four_bar"),
     *("punching_press_tangent", "crank_shaper", "offset_slider", "toggle_press", "rotor", "varying_compliance"),
 )
+#: These take more than ten seconds each.
+DEAR = ("punching_press_roller", "punching_press_hinges", "toggle_press")
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "scene", [pytest.param(s, marks=[] if s in ("punching_press", "rotor") else pytest.mark.extreme) for s in SCENES]
-)
+@pytest.mark.parametrize("scene", [pytest.param(s, marks=pytest.mark.extreme if s in DEAR else []) for s in SCENES])
 def test_peaks_of_scenes_without_a_run_are_those_of_the_steady_machine(
     scene: str, scene_text: Callable[..., str], tmp_path: Path
 ) -> None:

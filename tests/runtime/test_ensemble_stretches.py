@@ -29,8 +29,6 @@ ModelMaker = Callable[..., Model]
 OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")
 SPEED = "mechanism.driver.speed"
 
-SECOND = [pytest.mark.long, pytest.mark.extreme]
-
 
 def cut(whole: MemberArrays, cuts: list[list[int]]) -> list[MemberArrays]:
     """Segments cut for each member where its list says, in as many parts as the longest list has entries but one."""
@@ -98,7 +96,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
     ("law", "rtol"),
     [
         pytest.param("stiff", 1e-6, marks=pytest.mark.long),
-        *(pytest.param(law, rtol, marks=SECOND) for law, rtol in (("one-sided", 1e-6), ("tangent", 1e-2))),
+        *(pytest.param(law, rtol, marks=pytest.mark.long) for law, rtol in (("one-sided", 1e-6), ("tangent", 1e-2))),
     ],
 )
 def test_results_are_the_same_bits_for_stretches_of_any_length(

@@ -94,7 +94,7 @@ def test_motion_converges_to_the_hand_written_press(press: Make, name: str, meth
     assert tightest < 1e-12 * STEPS * growth
 
 
-@pytest.mark.parametrize("name", [SCENES[0], pytest.param(SCENES[1], marks=[pytest.mark.long, pytest.mark.extreme])])
+@pytest.mark.parametrize("name", [SCENES[0], pytest.param(SCENES[1], marks=pytest.mark.long)])
 def test_integrators_agree_with_each_other(press: Make, name: str) -> None:
     model = press(name)
     runs = {method: part_of_a_turn(model, method, 1e-12).x for method in METHODS if method in model.methods}
