@@ -169,10 +169,15 @@ def printed(found: Comparison) -> list[str]:
         )
     (_, first, *_), (_, second, *_, own) = found.rows[2:]
     apart, passes = 100 * (second / first - 1), BALLS - second
+    stated = [float(np.mean([o.line for o in found.lines if int(o.file) in group])) for _, group in GROUPS.values()]
+    passed = ball_pass("inner", angle_of("outer", stated[list(GROUPS).index(IDENTIFIED_ON)]))
     spins = (2 * passes / BALLS * (math.cos(angle) + PITCH / BALL) for angle in (own, found.angle))
     out += [
         "",
         f"BPFI of 105-108 and 169-172: {apart:.2f} % apart, {apart / 2:.2f} % from any one number at least",
+        "over the speeds that the files state: 105-108 {:+.3f} %, 169-172 {:+.3f} % from the angle of 130-133".format(
+            *(100 * (order / passed - 1) for order in stated[2:])
+        ),
         "2 BSF of 169-172: {:.3f} by the own angle, {:.3f} by slip".format(*spins),
     ]
     out += ["", "file       spall  order   over the line's height, in %:", " " * 28 + "2x  3x  -shaft  +shaft  shaft"]
