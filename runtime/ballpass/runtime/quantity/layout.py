@@ -294,6 +294,11 @@ class NodeLayer:
             return np.zeros(0)
         assert layout.track is not None
         values, rates = self._deflections.with_rates(layout.track, run.numbers)
+        # where a body leaves a stop faster than the stop expands, its force stays at zero
+        stops, numbers = {stop: _hysteresis(stop) for stop in self.model.manifest.stops}, run.numbers.parameters
+        columns = {stop: self._deflections.column(stop) for stop in stops}
+        clips = [1.0 + numbers[name] * rates[:, [columns[stop]]] for stop, name in stops.items() if name in numbers]
+        values = np.hstack([values, *clips])
         t, segment, signals = _between_nodes(layout, np.hstack([values, rates]) if corner else values)
         return find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times)
 
@@ -360,6 +365,12 @@ def _between_nodes(layout: Layout, signals: Array) -> tuple[Array, NDArray[np.in
     assert layout.track is not None
     assert layout.panels is not None
     return interpolated(layout.panels, layout.edges, signals[np.flatnonzero(layout.track.nodes.weight)])
+
+
+def _hysteresis(stop: str) -> str:
+    """Parameter of a stop, by its compression, as ``stop.wall.compression``."""
+    kind, name, _ = stop.split(".")
+    return f"mechanism.{kind}s.{name}.hysteresis"
 
 
 def _is_of_balls(quantity: Quantity) -> bool:

@@ -247,6 +247,11 @@ class ChannelValues:
         values, rates = np.split(every, 2, axis=1)
         return values, rates
 
+    def column(self, channel: str) -> int:
+        """First column of a channel among those of `with_rates`."""
+        names = [name for name, _ in self._columns]
+        return sum(size for _, size in self._columns[: names.index(channel)])
+
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         directions = len(chain.names)
         if directions not in self._derivatives:
