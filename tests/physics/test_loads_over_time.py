@@ -43,6 +43,14 @@ def test_no_answer_takes_turns_behind_the_table(worked: Model) -> None:
     assert run_for_figures(worked, run) is None
     with pytest.raises(RequestError, match="table or a window over time"):
         worked.settle()
+    for points in (
+        lambda: worked.section(readings=40, settling=20),
+        lambda: worked.bifurcation("bearing.clearance=2 um:4 um:2", readings=40, settling=20, exponent=False),
+    ):
+        with pytest.raises(RequestError, match=r"rows between 0\.4 s and 1\.2 s"):
+            points()
+    with pytest.raises(RequestError, match="table over time, which has no period"):
+        worked.steady(turns=1)
     # the peak of the heavy load is no impact of the start
     assert warnings_of_transient(worked, {}, cycles=20, transient=2) == []
 

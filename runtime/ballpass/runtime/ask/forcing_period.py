@@ -70,6 +70,16 @@ def refuse_free_driver(manifest: Manifest, question: str) -> None:
         )
 
 
+def refuse_changing(manifest: Manifest, values: Mapping[str, float], question: str, begin: float, end: float) -> None:
+    """Refuse points between two times [s] of turns that a table over time makes unlike each other."""
+    if driver_angle.changes_over_time(manifest, values, begin, end):
+        raise RequestError(
+            f"{question}: a load or slip follows a table or a window over time, with rows between {begin:.4g} s and "
+            f"{end:.4g} s, from where points are taken: turns there are unlike each other. Allowed: points behind the "
+            "last row (settling)."
+        )
+
+
 def forcing_period(
     model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, turns: float | None
 ) -> ForcingPeriod:
@@ -85,6 +95,7 @@ def forcing_period(
     RequestError
         What turns has no common period, or nothing changes with time.
     """
+    _refuse_tables(model)
     if turns is not None:
         speed = driver_angle.speed_name(model.manifest)
         if speed is None or numbers.values[speed] == 0.0:
@@ -176,15 +187,20 @@ def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: 
     return [rate for rate in phase_drifts(model, numbers, times, states, every) if _alike(model, rate) == 1]
 
 
-def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
-    """Rates that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls."""
-    found: dict[str, int] = {}
-    for k, item in enumerate(model.manifest.inputs):
+def _refuse_tables(model: LoadedModel) -> None:
+    for item in model.manifest.inputs:
         if (item.times and not item.rate) or (item.kind == "gate" and item.times):
             raise RequestError(
                 f"steady: {item.name} follows a table over time, which has no period. Allowed: loads and speeds that "
                 "are constant or turn evenly."
             )
+
+
+def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
+    """Rates that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls."""
+    _refuse_tables(model)
+    found: dict[str, int] = {}
+    for k, item in enumerate(model.manifest.inputs):
         if item.rate and numbers.values[item.rate] != 0.0 and _matters(model, numbers, times, states, k, item):
             found.setdefault(item.rate, _alike(model, item.rate))
     speed = driver_angle.speed_name(model.manifest)

@@ -227,7 +227,7 @@ def bifurcation(
     >>> [motion.exponent.high < 0.0 for motion in found.up]
     [True, True]
     """
-    from ballpass.runtime.ask.forcing_period import refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import refuse_changing, refuse_free_driver
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion
     from ballpass.runtime.ask.parameter_range import parameter_range
@@ -260,6 +260,8 @@ def bifurcation(
             for value in order.tolist():
                 given = {**overrides, chosen.name: value}
                 step = strobe.step(given)
+                values = model.numbers(given).values
+                refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
                 states, growth, magnitude = parts.once(
                     np.array([value, *([] if start is None else start)]),
                     partial(_motion, model, given, step, start, readings, settling, rtol, exponent, each),

@@ -239,7 +239,7 @@ def section(
     >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
     True
     """
-    from ballpass.runtime.ask.forcing_period import refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import refuse_changing, refuse_free_driver
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
     from ballpass.runtime.run.ball_angles import ball_angles
@@ -254,6 +254,7 @@ def section(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     angle, turns = 0.0 if at is None else at, cycle_turns(numbers.values)
     times = turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
+    refuse_changing(manifest, numbers.values, "section", turn * turns * settling, float(times[-1]))
     with shown("taking points", progress):
         run = model.simulate(
             duration=float(times[-1]),
