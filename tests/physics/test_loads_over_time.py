@@ -75,6 +75,36 @@ def test_turns_behind_the_last_row_are_alike(worked: Model) -> None:
     assert worked.life(transient=behind).states[0].turns >= 128
 
 
+@pytest.fixture(scope="module")
+def slow(make_model: Callable[..., Model]) -> Model:
+    load = """[loads.slow]
+type = "harmonic"
+mean = ["0 N", "-1000 N"]
+amplitude = ["0 N", "900 N"]
+frequency = "1 Hz"
+phase = "0 deg"
+
+"""
+    return make_model("rotor", ("[bearing]\n", load + "[bearing]\n"))
+
+
+def test_life_takes_whole_periods_of_a_slow_load(slow: Model) -> None:
+    """The third root of the mean of (a - b cos)^3 is that of a^3 + 3/2 a b^2; 50 turns of the shaft in a period."""
+    state = slow.life().states[0]
+    weight = 49.03
+    a, b = 1000.0 + weight, 900.0
+    assert state.settled
+    assert state.bearings[0].equivalent_load == pytest.approx((a**3 + 1.5 * a * b**2) ** (1 / 3), rel=1e-3)
+
+
+def test_a_load_slower_than_all_turns_is_not_settled(slow: Model) -> None:
+    """It begins at 100 N and comes to 1900 N after an hour and a half."""
+    slower = {"loads.slow.frequency": 1e-4}
+    assert not slow.life(parameters=slower).states[0].settled
+    with pytest.raises(RequestError, match="slowest harmonic load takes 500000 turns"):
+        slow.settle(parameters=slower)
+
+
 def test_explain_finds_the_heaviest_load_of_the_run(make_model: Callable[..., Model]) -> None:
     """A burst behind half a second, of which the first turn knows nothing."""
     late = BURST.replace('["0 s", "1.0 s", "1.005 s"', '["0 s", "0.5 s", "0.51 s"').replace(

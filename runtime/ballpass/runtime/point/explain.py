@@ -246,8 +246,7 @@ def _changing(model: LoadedModel, values: Mapping[str, float], turn: float) -> f
     length = run.duration or (run.cycles * turn if run.cycles is not None and math.isfinite(turn) else 0.0)
     if driver_angle.changes_over_time(model.manifest, values, 0.0, length):
         return length
-    rates = [values[item.rate] for item in model.manifest.inputs if item.rate.endswith(".angular_frequency")]
-    return min(length, max((driver_angle.TURN / rate for rate in rates), default=0.0))
+    return min(length, driver_angle.longest_harmonic(model.manifest, values))
 
 
 def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, length: float) -> tuple[Breakpoint, ...]:

@@ -37,9 +37,6 @@ TURNS, APART, MOST = 100, 5.0, 400
 #: Names of what is of a bearing.
 OF_BEARINGS = ("FTF", "BPFO", "BPFI", "2 BSF")
 
-#: What the rate of a harmonic load is called, behind its path.
-HARMONIC = ".angular_frequency"
-
 #: Speeds of the balls over both rings, behind the path of a bearing.
 PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
 
@@ -122,8 +119,8 @@ def characteristic_lines(
     shaft = speed / unit
     parts = driver_angle.cycle_turns(values)
     found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="", parts=parts)]
-    for rate in dict.fromkeys(item.rate for item in manifest.inputs if item.rate.endswith(HARMONIC)):
-        name = rate.removesuffix(HARMONIC).replace("loads.", "load ")
+    for rate in driver_angle.harmonic_rates(manifest):
+        name = rate.removesuffix(driver_angle.HARMONIC).replace("loads.", "load ")
         frequency = abs(values[rate]) / driver_angle.TURN / unit
         found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=0.0, side_name=""))
     for bearing in manifest.bearings:

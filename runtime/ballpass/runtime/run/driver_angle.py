@@ -18,6 +18,9 @@ from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, BearingInfo,
 
 TURN = 2.0 * math.pi
 
+#: What the rate of a harmonic load is called, behind its path.
+HARMONIC = ".angular_frequency"
+
 #: Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there.
 ANGLE_RESOLUTION = 1e-11
 
@@ -194,6 +197,16 @@ def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, insi
         else:
             found[:, k] = _table(item, values, t, inside)
     return found
+
+
+def harmonic_rates(manifest: Manifest) -> tuple[str, ...]:
+    """Constants that hold the angular frequencies of harmonic loads [rad/s], behind the paths of these."""
+    return tuple(dict.fromkeys(item.rate for item in manifest.inputs if item.rate.endswith(HARMONIC)))
+
+
+def longest_harmonic(manifest: Manifest, values: Values) -> float:
+    """Period of the slowest harmonic load [s]; zero without one."""
+    return max((TURN / values[rate] for rate in harmonic_rates(manifest)), default=0.0)
 
 
 def rows_over_time(manifest: Manifest, values: Values, begin: float, end: float) -> np.ndarray:

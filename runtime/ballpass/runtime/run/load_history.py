@@ -77,7 +77,11 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     transient = asked_transient(model, request.transient_cycles)
     given = request.cycles is not None or request.duration is not None
     doubles = not given and repeats(model, numbers.values, transient * turn)
-    turns = driver_angle.whole_cycles(numbers.values, LEAST)
+    turns: float = driver_angle.whole_cycles(numbers.values, LEAST)
+    slowest = driver_angle.longest_harmonic(manifest, numbers.values) / turn
+    if slowest > 1.0:  # whole periods of the load, as far as there are turns
+        turns = slowest * math.ceil(turns / slowest)
+    covered, turns = 2 * turns <= MOST, min(turns, MOST // 2)
     if doubles:
         request = replace(request, cycles=transient + turns)
     going = start_reducing(resolve(model, numbers, request), _channels(model))
@@ -94,7 +98,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         going.go_on(start + turns * turn)
         found = _compared(going, before)
         if found.settled or 2 * turns > MOST:
-            return found
+            return replace(found, settled=found.settled and covered)
         before = found
 
 

@@ -106,11 +106,13 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     """
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
-    turns = driver_angle.whole_cycles(numbers.values, LEAST)
-    if not (real(most) >= 2 * turns and float(most).is_integer()):
-        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.")
-    transient = asked_transient(model, request.transient_cycles)
     turn = driver_angle.period(model.manifest, numbers.values)
+    slowest = math.ceil(driver_angle.longest_harmonic(model.manifest, numbers.values) / turn)
+    turns = driver_angle.whole_cycles(numbers.values, max(LEAST, slowest))
+    if not (real(most) >= 2 * turns and float(most).is_integer()):
+        why = f" The slowest harmonic load takes {slowest} turns for a period." if slowest > LEAST else ""
+        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
+    transient = asked_transient(model, request.transient_cycles)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
     if driver_angle.changes_over_time(model.manifest, numbers.values, run.start, run.start + MOST * turn):
