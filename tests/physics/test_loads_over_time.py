@@ -75,9 +75,7 @@ def test_turns_behind_the_last_row_are_alike(worked: Model) -> None:
     assert worked.life(transient=behind).states[0].turns >= 128
 
 
-@pytest.fixture(scope="module")
-def slow(make_model: Callable[..., Model]) -> Model:
-    load = """[loads.slow]
+SLOW = """[loads.slow]
 type = "harmonic"
 mean = ["0 N", "-1000 N"]
 amplitude = ["0 N", "900 N"]
@@ -85,7 +83,11 @@ frequency = "1 Hz"
 phase = "0 deg"
 
 """
-    return make_model("rotor", ("[bearing]\n", load + "[bearing]\n"))
+
+
+@pytest.fixture(scope="module")
+def slow(make_model: Callable[..., Model]) -> Model:
+    return make_model("rotor", ("[bearing]\n", SLOW + "[bearing]\n"))
 
 
 def test_life_takes_whole_periods_of_a_slow_load(slow: Model) -> None:
@@ -95,6 +97,16 @@ def test_life_takes_whole_periods_of_a_slow_load(slow: Model) -> None:
     a, b = 1000.0 + weight, 900.0
     assert state.settled
     assert state.bearings[0].equivalent_load == pytest.approx((a**3 + 1.5 * a * b**2) ** (1 / 3), rel=1e-3)
+
+
+def test_turns_of_a_scene_without_a_run_say_that_they_hold_no_period(
+    slow: Model, make_model: Callable[..., Model], scene_text: Callable[..., str]
+) -> None:
+    text = scene_text("rotor")
+    bare = make_model("rotor", ("[bearing]\n", SLOW + "[bearing]\n"), (text[text.index("[run]") :], ""))
+    (said,) = warnings_of_transient(bare, {})
+    assert "are 0.2 s, and a period of its slowest harmonic load 1 s" in said
+    assert warnings_of_transient(bare, {"loads.slow.frequency": 5.0}) == warnings_of_transient(slow, {}) == []
 
 
 def test_a_load_slower_than_all_turns_is_not_settled(slow: Model) -> None:

@@ -51,12 +51,19 @@ def warnings_of_transient(
 
 
 def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
-    """A sentence where turns that a scene without a run takes lie behind rows of its tables over time."""
+    """A sentence where turns that a scene without a run takes lie behind rows of tables, or are no load's period."""
     settings, turn = model.run_settings, driver_angle.period(model.manifest, values)
     if settings.stated or settings.cycles is None or not math.isfinite(turn):
         return []
     begin = settings.transient_cycles * turn
     rows = driver_angle.rows_over_time(model.manifest, values, 0.0, begin)
+    slowest, length = driver_angle.longest_harmonic(model.manifest, values), settings.cycles * turn - begin
+    if not len(rows) and slowest > length * (1.0 + 1e-9):
+        return [
+            f"turns {settings.transient_cycles:g} to {settings.cycles:g}, which a scene without a run takes, are "
+            f"{length:.4g} s, and a period of its slowest harmonic load {slowest:.4g} s: extremes and means are those "
+            f'of a part of it. Give the run that is meant, as --duration "{begin + slowest:.4g} s".'
+        ]
     if not len(rows):
         return []
     return [
