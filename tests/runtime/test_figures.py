@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle
 from matplotlib.text import Annotation, Text
@@ -23,7 +23,7 @@ from matplotlib.text import Annotation, Text
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot import CAPTIONS, NAMES
+from ballpass.runtime.plot import CAPTIONS, NAMES, bearing
 from ballpass.runtime.plot.animation import choose_frames, to_plain
 from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
@@ -614,6 +614,17 @@ def test_a_ball_in_a_spall_is_no_applied_load(make_virtual: Callable[..., Model]
     model = make_virtual("punching_press", ("[bearing.initial]", f"{spalls}[bearing.initial]"))
     record = gather(model, model.simulate(cycles=0.01, transient=0))
     assert np.degrees(record.load_windows()) == pytest.approx(np.array([[237.0, 267.0]]))
+
+
+def test_pages_colour_contact_loads_as_figures_do() -> None:
+    """Script and style sheet have the stops of the colours once more."""
+    folder = Path(bearing.__file__).parent
+    (stops,) = re.findall(r"const STOPS = (.*);", (folder / "pictures.js").read_text(encoding="utf-8"))
+    shades = [tuple(int(part) / 255 for part in stop) for stop in re.findall(r"(\d+), (\d+), (\d+)", stops)]
+    # matplotlib's table has 256 places, of which none is a third
+    assert np.allclose(shades, bearing.LOAD_COLOURS(np.linspace(0.0, 1.0, 4))[:, :3], atol=0.006)
+    hexes = ", ".join(to_hex(shade) for shade in shades)
+    assert f"linear-gradient(to right, {hexes})" in (folder / "pictures.css").read_text(encoding="utf-8")
 
 
 def luminance(colour: tuple[float, float, float]) -> float:

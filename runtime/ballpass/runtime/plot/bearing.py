@@ -104,5 +104,5 @@ def _draw_load(axes: Axes, record: Record, sample: int, shown: list[int], centre
     # beside the arrow, clear of it by the text's half width and half height
     normal = np.array([load[1], -load[0]]) / size
     normal = normal if normal[0] > 0.0 else -normal
-    place = centre + (0.54 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.04) * length * normal
+    place = centre + (0.6 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.04) * length * normal
     write(axes, place, f"load\n{size:.0f} N", fontsize=8, color=SIGNAL, fontweight="bold")

@@ -186,7 +186,7 @@ function drawLinkage(parts) {
 }
 
 // ------------------------------------------------------------------------------------------------------------ bearing
-const STOPS = [[255, 255, 255], [244, 201, 93], [209, 73, 91], [74, 14, 35]];
+const STOPS = [[255, 255, 255], [180, 198, 223], [74, 111, 165], [13, 27, 51]];
 function colourOf(share) {
   const scaled = 3 * Math.min(Math.max(share, 0), 1), k = Math.min(Math.floor(scaled), 2);
   return STOPS[k].map((from, channel) => Math.round(from + (scaled - k) * (STOPS[k + 1][channel] - from)));
