@@ -42,7 +42,8 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     state = np.array([numbers.values[name] for name in model.manifest.initial])
     tolerance = 1e-6 * stepper_magnitudes(model, model.ensemble_driver.stepper, numbers, state, 2.0 * turn, turn)
     segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))
-    row = model.ensemble_driver.rows.empty(1, turn, channel_names(model.manifest))[0]
+    layout = model.ensemble_driver.rows
+    row = layout.empty(1, turn, layout.all_of(channel_names(model.manifest)))[0]
     times = np.linspace(0.0, 2.0 * turn, 77)
     states = np.full((len(times), len(state)), np.nan)
     held = stepper.hold()

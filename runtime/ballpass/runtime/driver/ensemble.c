@@ -87,7 +87,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     b->reducing[lane] = 0.0;
     if (job->reductions != NULL && b->start[lane] >= job->reductions[m * BP_REDUCTION + BP_FROM]) {
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES], *row = job->reductions + m * BP_REDUCTION;
-        bp_channels(&n, at->t, x, row, value, balls);
+        bp_channels(&n, at->t, x, row, b->balls, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
         if (!(row[BP_DURATION] > 0.0)) memcpy(row + BP_SHIFT, value, BP_LOOKED_AT * sizeof *value);
         put(b->shift, lane, row + BP_SHIFT, BP_CHANNELS);
@@ -169,10 +169,12 @@ static void advance(bp_lane_block *b)
                 b->linear.wt[i] = b->accepted[lane] != 0.0 ? b->linear.end_wt[i] : b->linear.wt[i];
             }
     } else {
+        const double *end = b->plain.k[plain->stages];
         for (int k = 0; k < BP_NX; k++)
             BP_EACH_LANE {
-                const int i = k * BP_L + lane;
-                b->plain.k[0][i] = b->accepted[lane] != 0.0 ? b->plain.k[plain->stages][i] : b->plain.k[0][i];
+                /* both are read: of a row whose number the compiler does not know it reads no lane that is not taken */
+                const double known = b->plain.k[0][k * BP_L + lane], slope = end[k * BP_L + lane];
+                b->plain.k[0][k * BP_L + lane] = b->accepted[lane] != 0.0 ? slope : known;
             }
     }
     BP_EACH_LANE {
@@ -202,13 +204,11 @@ static int worst_state(const bp_lane_block *b, int lane)
 static int eventful(const bp_lane_block *b)
 {
     double happens[BP_L] BP_ALIGNED;
-    int any = 0;
     BP_EACH_LANE {
         const double over = b->steps[lane] + b->rejected[lane] >= b->allowed[lane] ? b->active[lane] : 0.0;
         happens[lane] = b->accepted[lane] * b->last[lane] + over + b->small[lane] + b->changing[lane];
     }
-    for (int lane = 0; lane < BP_L; lane++) any |= happens[lane] != 0.0;
-    return any;
+    return bp_any_lane(happens);
 }
 
 /* What happens to a lane beyond a step: ends of segments, failures, changes of method.  Returns whether the lane has become free. */
@@ -292,10 +292,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int method)
     if (waiting < 0) return 1;
     memset(b, 0, sizeof *b);
     b->method = method;
-    b->wanted = job->reductions != NULL ? job->reductions + BP_WANTED : NULL;
-    b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
-    b->guarded = b->balls && !bp_balls_asked(job->reductions);
-    b->powers = job->reductions != NULL ? bp_powers_wanted(job->reductions) : 0;
+    if (job->reductions != NULL) list_wanted(b, job->reductions);
     b->numbers.u = b->u;
     b->numbers.p = b->p;
     b->numbers.c = b->c;
@@ -322,9 +319,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int method)
                                   b->error);
         else bp_lane_explicit_step(plain, &b->plain, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
         judge(job, b, changeable);
-        double reducing = 0.0;
-        for (int lane = 0; lane < BP_L; lane++) reducing += b->reducing[lane];
-        if (reducing > 0.0) reduce(job, b);
+        if (bp_any_lane(b->reducing)) reduce(job, b);
         advance(b);
         const int happening = eventful(b);
         for (int lane = 0; lane < BP_L && happening; lane++) {

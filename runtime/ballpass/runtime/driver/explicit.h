@@ -151,16 +151,20 @@ BP_INLINE void BP_NAME(explicit_dense)(const bp_explicit_method *restrict method
         BP_NAME(add)(method->dense[row], end + 1 + method->dense_stages, slopes, &h, NULL, dense[2 + row]);
 }
 
-/* y = x + theta (D + (1 - theta) (F1 + theta (F2 + (1 - theta) (F3 + ...)))). */
+/* Part e of y = x + theta (D + (1 - theta) (F1 + theta (F2 + (1 - theta) (F3 + ...)))). */
+BP_INLINE void BP_NAME(explicit_part)(const bp_explicit_method *restrict method, const double dense[][BP_NX * BP_W],
+                                      const double *restrict x, const double *restrict next, double theta, int e, double *restrict y)
+{
+    BP_V inner = {0.0};
+#pragma GCC unroll 16
+    for (int row = 1 + method->dense_rows; row >= 0; row--)
+        inner = (BP_AT(const BP_V, dense[row], e) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
+    BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + inner);
+}
+
 BP_INLINE void BP_NAME(explicit_at)(const bp_explicit_method *restrict method, const double dense[][BP_NX * BP_W], const double *restrict x,
                                     const double *restrict next, double theta, double *restrict y)
 {
 #pragma GCC unroll 16
-    for (int e = 0; e < 2 * BP_VS; e++) {
-        BP_V inner = {0.0};
-#pragma GCC unroll 16
-        for (int row = 1 + method->dense_rows; row >= 0; row--)
-            inner = (BP_AT(const BP_V, dense[row], e) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-        BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + inner);
-    }
+    for (int e = 0; e < 2 * BP_VS; e++) BP_NAME(explicit_part)(method, dense, x, next, theta, e, y);
 }

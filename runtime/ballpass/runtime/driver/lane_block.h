@@ -60,7 +60,10 @@ typedef struct {
     int method;         /* which this pass advances */
     int balls, powers;  /* whether channels of the balls, and powers of their loads, are reduced */
     int guarded;        /* whether of these only such as guard a run */
-    const double *wanted; /* not zero for channels that are reduced; all members have the same */
+    const double *wanted; /* a row of reductions: what is wanted, of all members the same */
+    int extremes, moments[BP_MOMENTS];                           /* how many channels are, */
+    int extreme[BP_LOOKED_AT], moment_of[BP_MOMENTS][BP_CHANNELS]; /* and which */
+    int states, state[BP_NX]; /* which states are evaluated within a step */
     bp_lane_numbers numbers;
     bp_lane_angles angles; /* of the step tried */
 } bp_lane_block;

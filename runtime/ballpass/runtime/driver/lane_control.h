@@ -70,14 +70,14 @@ static void look(const bp_job *job, bp_lane_block *b, const double *looking)
 static void judge(const bp_job *job, bp_lane_block *b, int changeable)
 {
     double beyond[BP_L] BP_ALIGNED, factor[BP_L] BP_ALIGNED;
+    const double order = bp_methods[b->method].error_exponent;
     /* states beyond reach: no number, or so large that the tolerance is below their rounding (within_reach in run.h).  A comparison with
        what is no number is false */
     BP_EACH_LANE beyond[lane] = 0.0;
     for (int k = 0; k < BP_NX; k++)
         BP_EACH_LANE beyond[lane] += fabs(b->next[k * BP_L + lane]) * b->weight[k * BP_L + lane] <= 1.0 / DBL_EPSILON ? 0.0 : 1.0;
     BP_EACH_LANE b->accepted[lane] = b->error[lane] <= 1.0 && beyond[lane] == 0.0 ? b->active[lane] : 0.0;
-    bp_lane_step_factor(bp_methods[b->method].error_exponent, b->error, b->accepted, b->rejected_last,
-                        b->log_error, factor);
+    BP_EACH_LANE factor[lane] = bp_step_factor(order, b->error[lane], b->accepted[lane], b->rejected_last[lane], &b->log_error[lane]);
     BP_EACH_LANE {
         const double accepted = b->accepted[lane];
         /* a last step cut short says nothing against the size that was proposed */
@@ -95,7 +95,6 @@ static void judge(const bp_job *job, bp_lane_block *b, int changeable)
     if (bp_methods[b->method].linear) BP_EACH_LANE b->pivoted[lane] += b->active[lane] * b->linear.pivoted[lane];
     if (!changeable) return;
     double looking[BP_L] BP_ALIGNED;
-    int any = 0;
     BP_EACH_LANE {
         /* bp_family_looks, for all lanes: steps are not counted while all are examined */
         const double due = b->until_look[lane] == 0.0 || b->at_limit[lane] != 0.0 ? b->accepted[lane] : 0.0;
@@ -103,8 +102,7 @@ static void judge(const bp_job *job, bp_lane_block *b, int changeable)
         looking[lane] = due;
         b->until_look[lane] -= due == 0.0 ? counted : 0.0;
     }
-    for (int lane = 0; lane < BP_L; lane++) any |= looking[lane] != 0.0;
-    if (any) look(job, b, looking);
+    if (bp_any_lane(looking)) look(job, b, looking);
 }
 
 #endif

@@ -15,6 +15,14 @@ enum { BP_L = BP_MEMBERS };
 #define BP_ALIGNED __attribute__((aligned(64)))
 #define BP_INLINE static inline __attribute__((always_inline))
 
+/* Whether a flag is set, not 0, in any lane. */
+BP_INLINE int bp_any_lane(const double *restrict flags)
+{
+    double sum = 0.0;
+    _Pragma("omp simd reduction(+ : sum)") for (int lane = 0; lane < BP_L; lane++) sum += flags[lane];
+    return sum != 0.0;
+}
+
 typedef struct {
     const double *u;
     const double *p;
@@ -26,7 +34,7 @@ typedef struct {
     double angle[BP_NA * BP_L] BP_ALIGNED, rate[BP_NA * BP_L] BP_ALIGNED;
     double cosine[BP_NA * BP_L] BP_ALIGNED, sine[BP_NA * BP_L] BP_ALIGNED;
     double far[BP_L] BP_ALIGNED; /* whether an angle turns by more within the step than bp_turn takes */
-    double any;                  /* whether one does so in any lane */
+    int any;                     /* whether one does so in any lane */
 } bp_lane_angles;
 
 BP_INLINE void bp_lane_angles_start(bp_lane_angles *restrict at, const bp_lane_numbers *n, const double *restrict t, const double *restrict h)
@@ -42,9 +50,7 @@ BP_INLINE void bp_lane_angles_start(bp_lane_angles *restrict at, const bp_lane_n
             bp_sincos(at->angle[i], &at->sine[i], &at->cosine[i]);
         }
     BP_EACH_LANE at->far[lane] = largest[lane] * h[lane] <= BP_SMALL_ANGLE ? 0.0 : 1.0;
-    double any = 0.0;
-    for (int lane = 0; lane < BP_L; lane++) any += at->far[lane];
-    at->any = any;
+    at->any = bp_any_lane(at->far);
 }
 
 /* Cosines and sines of the angles at the times t + node h, which are returned; as bp_directions for one member. */
@@ -57,7 +63,7 @@ BP_INLINE void bp_lane_turn(const bp_lane_angles *restrict at, double node, cons
             const int i = k * BP_L + lane;
             bp_turn(at->cosine[i], at->sine[i], at->rate[i] * h[lane] * node, &C[i], &S[i]);
         }
-    if (at->any == 0.0) return;
+    if (!at->any) return;
     for (int k = 0; k < BP_NA; k++)
         BP_EACH_LANE {
             const int i = k * BP_L + lane;
@@ -148,6 +154,28 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_acceleration_lanes(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
     bp_member_acceleration_jacobian_lanes(x, S, G, r, n->u, n->p, n->c, w, A, B);
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
+}
+
+/* Deflection of the most loaded ball of each bearing at the times `time`, into its channel; of the kernel the compiler leaves nothing else. */
+static inline __attribute__((flatten)) void bp_lane_deflections(const bp_lane_numbers *n, const double *restrict time, const double *restrict x,
+                                                                double *restrict value)
+{
+    double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
+    bp_member_cage_lanes(time, n->u, n->p, n->c, w);
+    bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+#define BP_CHANNEL(b)                                                                                                            \
+    for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED;                               \
+        double *most = value + (BP_BALL_CHANNELS * (b) + BP_DEFLECTION) * BP_L;                                                  \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                      \
+        bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                          \
+        BP_EACH_LANE {                                                                                                           \
+            const double own = rows[BP_DEFLECTION * BP_L + lane];                                                                \
+            most[lane] = j == 0 || own > most[lane] ? own : most[lane];                                                          \
+        }                                                                                                                        \
+    }
+    BP_EACH_BEARING(BP_CHANNEL)
+#undef BP_CHANNEL
 }
 
 /* A power of the load of a ball, added to the sum over the balls, where it is wanted; the mean, and a power of one. */

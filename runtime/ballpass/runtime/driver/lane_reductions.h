@@ -44,6 +44,30 @@ static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, dou
     }
 }
 
+/* List what of a step is wanted by a row of reductions. */
+static void list_wanted(bp_lane_block *b, const double *reduction)
+{
+    const double balls = bp_wanted(reduction, BP_NX), *wanted = reduction + BP_WANTED;
+    b->wanted = reduction;
+    b->balls = balls > 0.0;
+    b->guarded = b->balls && balls < 1.0;
+    b->powers = bp_wanted(reduction, BP_LOOKED_AT) > 0.0;
+    /* balls are evaluated within the step, or at the end of a part of it */
+    const int all_states = b->balls && (!b->guarded || bp_parts(bp_methods[b->method].dense_degree) > 1);
+    for (int k = 0; k < BP_CHANNELS; k++) {
+        double extreme = 0.0, any = (double)all_states;
+        for (int e = 0; e < BP_EXTREMES; e++) extreme += wanted[e * BP_CHANNELS + k];
+        if (extreme > 0.0) b->extreme[b->extremes++] = k;
+        any += extreme;
+        for (int m = 0; m < BP_MOMENTS; m++) {
+            const double moment = wanted[(BP_EXTREMES + m) * BP_CHANNELS + k];
+            if (moment != 0.0) b->moment_of[m][b->moments[m]++] = k;
+            any += moment;
+        }
+        if (any > 0.0 && k < BP_NX) b->state[b->states++] = k;
+    }
+}
+
 /* Add a part of the steps of lanes to the powers of loads, whose means over the part are those of the channels, and to the places of the
    raceways; see bp_add_sectors. */
 static void add_passes(const bp_job *job, bp_lane_block *b, double part, double span, const double *add, const double (*mean)[BP_L])
@@ -71,7 +95,7 @@ static void add_passes(const bp_job *job, bp_lane_block *b, double part, double 
         bp_passes(b->t[lane] + (part + span) * b->h[lane], x, n.u, n.p, n.c, to);
         for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
             const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            if (b->wanted[BP_LOOKED_AT + k] != 0.0) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
+            if (b->wanted[BP_WANTED_MOMENT + BP_LOOKED_AT + k] != 0.0) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
         }
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
@@ -95,61 +119,69 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         const double theta = part + span * ((double)q / (BP_POINTS - 1));
         double *restrict y = b->sampled[q];
         if (theta >= 1.0) memcpy(y, b->next, sizeof b->next);
-        /* the method of most runs once more, as its step: its coefficients are constants */
-        else if (b->method == BP_AUTO_LOW) bp_lane_explicit_at(bp_methods[BP_AUTO_LOW].plain, dense, b->x, b->next, theta, y);
-        else if (method->plain) bp_lane_explicit_at(method->plain, dense, b->x, b->next, theta, y);
-        else bp_lane_rosenbrock_at(method->linear, dense, b->x, b->next, theta, y);
+        for (int i = 0; i < b->states && theta < 1.0; i++) {
+            /* the method of most runs once more, as its step: its coefficients are constants */
+            if (b->method == BP_AUTO_LOW) bp_lane_explicit_part(bp_methods[BP_AUTO_LOW].plain, dense, b->x, b->next, theta, b->state[i], y);
+            else if (method->plain) bp_lane_explicit_part(method->plain, dense, b->x, b->next, theta, b->state[i], y);
+            else bp_lane_rosenbrock_part(method->linear, dense, b->x, b->next, theta, b->state[i], y);
+        }
         if (!b->balls || (b->guarded && q < BP_POINTS - 1)) continue;
         double time[BP_L] BP_ALIGNED;
         BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
-        bp_lane_ball_channels(&b->numbers, time, y, b->wanted, b->powers, y + BP_NX * BP_L, b->first[q]);
+        if (b->guarded) bp_lane_deflections(&b->numbers, time, y, y + BP_NX * BP_L);
+        else bp_lane_ball_channels(&b->numbers, time, y, b->wanted + BP_WANTED_MOMENT, b->powers, y + BP_NX * BP_L, b->first[q]);
     }
-    /* channels that only guard against results that mean nothing are evaluated at the ends, and between where that may be a new extreme */
-    for (int k = BP_NX; k < BP_LOOKED_AT && b->guarded; k++)
+    /* deflections that only guard against results that mean nothing are evaluated at the ends, and between where that may be a new extreme */
+    for (int k = BP_NX + BP_DEFLECTION; k < BP_LOOKED_AT && b->guarded; k += BP_BALL_CHANNELS)
         for (int q = 1; q < BP_POINTS - 1; q++)
             BP_EACH_LANE {
                 const double *end = b->sampled[BP_POINTS - 1] + k * BP_L, *start = b->sampled[0] + k * BP_L;
                 b->sampled[q][k * BP_L + lane] = start[lane] + 0.25 * q * (end[lane] - start[lane]);
             }
-    double news[BP_EXTREMES][BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
+    double news[BP_EXTREMES][BP_LOOKED_AT][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};
-    for (int k = 0; k < BP_CHANNELS; k++) {
-        if (b->wanted[k] == 0.0) continue;
-        const int row = k * BP_L;
+    for (int i = 0; i < b->extremes; i++) {
+        const int k = b->extreme[i], row = k * BP_L;
+        const double *wanted = b->wanted + BP_WANTED + k;
         BP_EACH_LANE {
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
-            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane], shift = b->shift[row + lane];
-            bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
-            double low, high, sums[BP_MOMENTS];
-            bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
-            q.c0 -= shift;
-#define BP_OF_DEGREE(m, degree) sums[m] = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);
-            BP_EACH_MOMENT(BP_OF_DEGREE)
-#undef BP_OF_DEGREE
-            if (k >= BP_LOOKED_AT) {
-                power[k - BP_LOOKED_AT][lane] = sums[0];
-                continue;
-            }
-            for (int m = 0; m < BP_MOMENTS; m++) b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * sums[m] : 0.0;
+            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
+            double low, high;
+            bp_survey(v0, v1, v2, v3, v4, bp_quartic_through(v0, v1, v2, v3, v4), &low, &high);
             for (int e = 0; e < BP_EXTREMES; e++) {
-                const double bound = bp_sign[e] > 0.0 ? high : low;
-                const double new = bp_sign[e] * bound > bp_sign[e] * b->best[e][row + lane] ? add[lane] : 0.0;
+                const double bound = bp_sign[e] > 0.0 ? high : low, asked = wanted[e * BP_CHANNELS] != 0.0 ? add[lane] : 0.0;
+                const double new = bp_sign[e] * bound > bp_sign[e] * b->best[e][row + lane] ? asked : 0.0;
                 news[e][k][lane] = new;
                 any[lane] += new;
                 of_balls[lane] += k < BP_NX ? 0.0 : new;
             }
         }
     }
-    for (int lane = 0; lane < BP_L; lane++) {
+#define BP_OF_DEGREE(m, degree)                                                                                                        \
+    for (int i = 0; i < b->moments[m]; i++) {                                                                                          \
+        const int k = b->moment_of[m][i], row = k * BP_L;                                                                              \
+        BP_EACH_LANE {                                                                                                                 \
+            const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];               \
+            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane], shift = b->shift[row + lane];                 \
+            bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);                                                                     \
+            q.c0 -= shift;                                                                                                             \
+            const double mean = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);                                            \
+            if (k < BP_LOOKED_AT) b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * mean : 0.0;                       \
+            else power[k - BP_LOOKED_AT][lane] = mean;                                                                                 \
+        }                                                                                                                              \
+    }
+    BP_EACH_MOMENT(BP_OF_DEGREE)
+#undef BP_OF_DEGREE
+    for (int lane = 0; lane < BP_L && bp_any_lane(any); lane++) {
         if (any[lane] == 0.0) continue;
         double *reduction = job->reductions + b->who[lane] * BP_REDUCTION;
         bp_lane_source source;
         lane_source(job, b, lane, part, span, of_balls[lane] != 0.0, &source);
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
         const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], &source.n, lane_state, &source, balls};
-        for (int k = 0; k < BP_CHANNELS; k++) {
-            if (b->wanted[k] == 0.0) continue;
-            for (int e = 0; e < BP_EXTREMES && k < BP_LOOKED_AT; e++) {
+        for (int i = 0; i < b->extremes; i++) {
+            for (int e = 0; e < BP_EXTREMES; e++) {
+                const int k = b->extreme[i];
                 if (news[e][k][lane] != 0.0) bp_extreme(reduction, e, k, b->sampled[0] + k * BP_L + lane, BP_CHANNELS * BP_L, &step);
                 b->best[e][k * BP_L + lane] = reduction[BP_EXTREME + 3 * e * BP_CHANNELS + k];
             }

@@ -60,7 +60,6 @@ BP_INLINE bp_lane bp_lane_time_term(const bp_lane_linear *at, int i, int c, bp_l
 #include "explicit.h"
 #include "rosenbrock.h"
 #include "iteration_matrix.h"
-#include "step_size.h"
 #undef BP_NAME
 #undef BP_W
 #undef BP_N

@@ -106,16 +106,16 @@ static inline __attribute__((always_inline)) double bp_total(const double *restr
 {
     const int directions = balls % 2 == 0 ? balls / 2 : balls;
     bp_summands sum = {0.0};
-    int j = 0;
-    for (; j + BP_SUMMANDS <= directions; j += BP_SUMMANDS) {
-        bp_summands both = *(const bp_summands *)(terms + j);
-        if (balls % 2 == 0) both += *(const bp_summands *)(terms + directions + j);
-        sum += both;
-    }
-    if (j < directions) {
-        bp_summands rest = {0.0};
-        for (int i = j; i < directions; i++) rest[i - j] = balls % 2 == 0 ? terms[i] + terms[directions + i] : terms[i];
-        sum += rest;
+    for (int j = 0; j < directions; j += BP_SUMMANDS) {
+        bp_summands more = {0.0};
+        if (j + BP_SUMMANDS <= directions) {
+            more = *(const bp_summands *)(terms + j);
+            if (balls % 2 == 0) more += *(const bp_summands *)(terms + directions + j);
+        } else {
+            for (int i = j; i < directions; i++) more[i - j] = balls % 2 == 0 ? terms[i] + terms[directions + i] : terms[i];
+        }
+        if (j > 0) sum += more;
+        else sum = more;
     }
     return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }

@@ -73,7 +73,9 @@ static void reduce_start(bp_run *run, double start)
     run->reduction = run->options->reduction;
     if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
     if (run->reduction == NULL) return;
-    bp_channels(&run->numbers, 0.0, run->x, run->reduction, run->sampled[0], run->balls[0]);
+    run->reduces_balls = bp_wanted(run->reduction, BP_NX) > 0.0;
+    run->reduces_powers = bp_wanted(run->reduction, BP_LOOKED_AT) > 0.0;
+    bp_channels(&run->numbers, 0.0, run->x, run->reduction, run->reduces_balls, run->sampled[0], run->balls[0]);
 }
 
 /* Returns whether the step's dense output is prepared. */
@@ -87,11 +89,11 @@ static int reduce_step(bp_run *run, double start, double t, double h, int prepar
         for (int i = 1; i < BP_POINTS; i++) {
             double y[BP_NX];
             const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
-            bp_channels(&run->numbers, time, y, run->reduction, run->sampled[i], run->balls[i]);
+            bp_channels(&run->numbers, time, y, run->reduction, run->reduces_balls, run->sampled[i], run->balls[i]);
         }
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
         const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};
-        bp_reduce(run->reduction, (const double(*)[BP_CHANNELS])run->sampled, &within);
+        bp_reduce(run->reduction, run->reduces_powers, (const double(*)[BP_CHANNELS])run->sampled, &within);
         memcpy(run->balls[0], run->balls[BP_POINTS - 1], sizeof run->balls[0]);
         memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);
     }

@@ -43,28 +43,16 @@ enum {
 /* Of what few steps call: kept out of the code that all of them run. */
 #define BP_SELDOM __attribute__((noinline)) static
 
-/* Whether channels of the balls are wanted. */
-static inline int bp_balls_wanted(const double *reduction)
+/* The most that is wanted of the channels from the `first` on: 0 nothing, 1 what is asked for, between them what only guards the run. */
+static inline double bp_wanted(const double *reduction, int first)
 {
-    int wanted = 0;
-    for (int k = BP_NX; k < BP_CHANNELS; k++) wanted |= reduction[BP_WANTED + k] != 0.0;
-    return wanted;
-}
-
-/* Whether one of them is asked for, and does not only guard the run. */
-static inline int bp_balls_asked(const double *reduction)
-{
-    int asked = 0;
-    for (int k = BP_NX; k < BP_CHANNELS; k++) asked |= reduction[BP_WANTED + k] == 1.0;
-    return asked;
-}
-
-/* Whether powers of the loads are. */
-static inline int bp_powers_wanted(const double *reduction)
-{
-    int wanted = 0;
-    for (int k = BP_LOOKED_AT; k < BP_CHANNELS; k++) wanted |= reduction[BP_WANTED + k] != 0.0;
-    return wanted;
+    double most = 0.0;
+    for (int row = 0; row < BP_EXTREMES + BP_MOMENTS; row++)
+        for (int k = first; k < BP_CHANNELS; k++) {
+            const double wanted = reduction[BP_WANTED + row * BP_CHANNELS + k];
+            most = wanted > most ? wanted : most;
+        }
+    return most;
 }
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
@@ -122,11 +110,10 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
 #define BP_POWER_OF(b, row, mean, exponent)                                                            \
     if ((wanted)[row] != 0.0) power[row] = bp_power(power[mean], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
 
-/* All channels at a state and time, and all quantities of the balls; those of the balls are zero where the row `reduction` wants none. */
-static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, const double *restrict reduction,
+/* All channels at a state and time, and all quantities of the balls; those of the balls are zero where they are not wanted. */
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, const double *restrict reduction, int balls,
                                double *restrict value, double *restrict q)
 {
-    const int balls = bp_balls_wanted(reduction);
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
     if (!balls) return;
@@ -141,7 +128,7 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
     }                                                                                                  \
     {                                                                                                  \
         const double *of = q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL;                                 \
-        const double *wanted = reduction + BP_WANTED + BP_LOOKED_AT + BP_POWERS * (b);                 \
+        const double *wanted = reduction + BP_WANTED_MOMENT + BP_LOOKED_AT + BP_POWERS * (b);          \
         double *power = value + BP_LOOKED_AT + BP_POWERS * (b);                                        \
         BP_EACH_MEAN(b, BP_MEAN_POWER)                                                                 \
         BP_EACH_POWER_OF(b, BP_POWER_OF)                                                               \
@@ -505,8 +492,8 @@ BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const dou
     else bp_ball_extreme(search, u);
 }
 
-/* Add an accepted step whose channels at the quarters are v. */
-static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
+/* Add an accepted step whose channels at the quarters are v; `powers`: whether those of loads are wanted. */
+static inline void bp_reduce(double *reduction, int powers, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
 {
     const double h = step->h;
     const int first = !(reduction[BP_DURATION] > 0.0);
@@ -526,15 +513,16 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
 #undef BP_OF_DEGREE
     }
     for (int k = 0; k < BP_LOOKED_AT; k++) {
-        if (reduction[BP_WANTED + k] == 0.0) continue;
-        for (int m = 0; m < BP_MOMENTS; m++) reduction[BP_MOMENT + m * BP_CHANNELS + k] += h * moment[m][k];
+        for (int m = 0; m < BP_MOMENTS; m++)
+            if (reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + k] != 0.0) reduction[BP_MOMENT + m * BP_CHANNELS + k] += h * moment[m][k];
         for (int e = 0; e < BP_EXTREMES; e++) {
+            if (reduction[BP_WANTED + e * BP_CHANNELS + k] == 0.0) continue;
             const double bound = bp_sign[e] > 0.0 ? top[k] : bottom[k];
             if (first || bp_sign[e] * bound > bp_sign[e] * reduction[BP_EXTREME + 3 * e * BP_CHANNELS + k])
                 bp_extreme(reduction, e, k, v[0] + k, BP_CHANNELS, step);
         }
     }
-    if (bp_powers_wanted(reduction)) {
+    if (powers) {
         double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
         const double *of = step->balls[0];
         for (int end = 0; end < 2; end++) {
@@ -543,7 +531,7 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         }
         for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
             const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            if (reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0) reduction[BP_MOMENT + BP_LOOKED_AT + k] += turned * moment[0][BP_LOOKED_AT + k];
+            if (reduction[BP_WANTED_MOMENT + BP_LOOKED_AT + k] != 0.0) reduction[BP_MOMENT + BP_LOOKED_AT + k] += turned * moment[0][BP_LOOKED_AT + k];
         }
 #define BP_ADD(b)                                                                                                                       \
     bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_SECTOR_POWER(b),                                   \

@@ -94,7 +94,7 @@ BP_INLINE void BP_NAME(rosenbrock_error)(const bp_rosenbrock_method *restrict me
     BP_NAME(norm)(estimate, weight, error);
 }
 
-/* Dense output of an accepted step: y = x + theta (D + (1 - theta) (H1 + theta (H2 + theta H3))). */
+/* Terms H1, H2, ... of the dense output of an accepted step. */
 BP_INLINE void BP_NAME(rosenbrock_dense)(const bp_rosenbrock_method *restrict method, const double u[][BP_NX * BP_W],
                                          double dense[][BP_NX * BP_W])
 {
@@ -102,15 +102,20 @@ BP_INLINE void BP_NAME(rosenbrock_dense)(const bp_rosenbrock_method *restrict me
     for (int row = 0; row < method->dense_rows; row++) BP_NAME(add)(method->dense[row], method->stages, u, &one, NULL, dense[row]);
 }
 
+/* Part e of y = x + theta (D + (1 - theta) (H1 + theta (H2 + theta H3))). */
+BP_INLINE void BP_NAME(rosenbrock_part)(const bp_rosenbrock_method *restrict method, const double dense[][BP_NX * BP_W],
+                                        const double *restrict x, const double *restrict next, double theta, int e, double *restrict y)
+{
+    const int rows = method->dense_rows;
+    BP_V inner = BP_AT(const BP_V, dense[rows - 1], e);
+#pragma GCC unroll 16
+    for (int row = rows - 2; row >= 0; row--) inner = BP_AT(const BP_V, dense[row], e) + theta * inner;
+    BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + (1.0 - theta) * inner);
+}
+
 BP_INLINE void BP_NAME(rosenbrock_at)(const bp_rosenbrock_method *restrict method, const double dense[][BP_NX * BP_W],
                                       const double *restrict x, const double *restrict next, double theta, double *restrict y)
 {
-    const int rows = method->dense_rows;
 #pragma GCC unroll 16
-    for (int e = 0; e < 2 * BP_VS; e++) {
-        BP_V inner = BP_AT(const BP_V, dense[rows - 1], e);
-#pragma GCC unroll 16
-        for (int row = rows - 2; row >= 0; row--) inner = BP_AT(const BP_V, dense[row], e) + theta * inner;
-        BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + (1.0 - theta) * inner);
-    }
+    for (int e = 0; e < 2 * BP_VS; e++) BP_NAME(rosenbrock_part)(method, dense, x, next, theta, e, y);
 }

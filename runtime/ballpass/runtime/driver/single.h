@@ -4,11 +4,11 @@
 
 #include <float.h>
 #include <stddef.h>
-#include <stdint.h>
 
 #include "method_tables.h"
 #include "model.h"
 #include "sqrt_time.h"
+#include "step_size.h"
 
 #define BP_INLINE static inline __attribute__((always_inline))
 #define BP_ALIGNED __attribute__((aligned(64)))
@@ -69,9 +69,6 @@ BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
     return d * at->at[c];
 }
 
-/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
-static const double BP_LOG_SMALL_ERROR = -9.210340371976182;
-
 #define BP_NAME(f) bp_##f
 #define BP_W 1
 #define BP_N double
@@ -82,7 +79,6 @@ static const double BP_LOG_SMALL_ERROR = -9.210340371976182;
 #include "explicit.h"
 #include "rosenbrock.h"
 #include "iteration_matrix.h"
-#include "step_size.h"
 #undef BP_NAME
 #undef BP_W
 #undef BP_N

@@ -96,34 +96,34 @@ static int set_aside(bp_run *run, const bp_family *family, double t, int rejecte
 static int take_step(bp_run *run, bp_family *family, double start, double end, double *time, int changeable)
 {
     ballpass_result *result = run->result;
-    const bp_taken taken = run->taken;
-    const double t = *time, h = taken.h, length = end - start;
-    const int prepared = write_outputs(run, start, t, h, taken.last ? end : start + (t + h));
+    const bp_taken *taken = &run->taken;
+    const double t = *time, h = taken->h, length = end - start;
+    const int prepared = write_outputs(run, start, t, h, taken->last ? end : start + (t + h));
     run->waiting = run->options->pause && result->written >= run->outputs;
     if (run->waiting) {
         result->step = run->step;
         return BALLPASS_PAUSED;
     }
     const int reduced = reduce_step(run, start, t, h, prepared);
-    keep_step(run, start, t, h, taken.last ? end : start + (t + h), taken.met == CUT, reduced);
+    keep_step(run, start, t, h, taken->last ? end : start + (t + h), taken->met == CUT, reduced);
     /* a step that was cut, or has its own pace, does not show which family suits */
-    const int chosen = changeable && taken.met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
+    const int chosen = changeable && taken->met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
     tangent_accept(run);
     memcpy(run->x, run->next, sizeof run->next);
-    if (taken.met == CUT) {
-        if (taken.factor < 1.0) run->step = taken.tried * taken.factor;
-    } else if (!taken.last || taken.factor < 1.0) {
-        run->step = stretched(run, start, t, h, taken.factor, 1);
+    if (taken->met == CUT) {
+        if (taken->factor < 1.0) run->step = taken->tried * taken->factor;
+    } else if (!taken->last || taken->factor < 1.0) {
+        run->step = stretched(run, start, t, h, taken->factor, 1);
     }
-    if (taken.met == NO_KINK) remember_touch(run, h, taken.factor);
-    const double reached = *time = taken.last ? length : t + h;
-    if (taken.met == CUT) {
+    if (taken->met == NO_KINK) remember_touch(run, h, taken->factor);
+    const double reached = *time = taken->last ? length : t + h;
+    if (taken->met == CUT) {
         tangent_switch(run, reached);
         tangent_onset(run, reached, 1);
-        turn_sides(run, start + reached, taken.tried);
+        turn_sides(run, start + reached, taken->tried);
     }
     sides_move_on(run);
-    if (taken.met == CUT) sides_jump(run, reached);
+    if (taken->met == CUT) sides_jump(run, reached);
     if (has_stalled(run)) {
         result->time = start + reached;
         return BALLPASS_STALLED;
@@ -139,7 +139,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         } else {
             linearize(run, reached, 1);
         }
-    } else if (taken.met == CUT && is_explicit(run->method)) {
+    } else if (taken->met == CUT && is_explicit(run->method)) {
         first_slope(run, reached);
         tangent_start(run, reached);
     } else if (is_explicit(run->method)) {
@@ -217,9 +217,8 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             if (by_derivatives) keep_sides(run);
         }
         if (h != tried) last = 0;
-        const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run), rejected_before = rejected_last;
-        double factor;
-        bp_step_factor(bp_methods[run->method].error_exponent, &error, &accepted, &rejected_before, &run->last_error, &factor);
+        const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run);
+        const double factor = bp_step_factor(bp_methods[run->method].error_exponent, error, accepted, rejected_last, &run->last_error);
         if (accepted != 0.0) {
             result->steps++;
             rejected_last = 0;

@@ -30,7 +30,7 @@ from ballpass.runtime.many.members import Members, Span, Table, make_members, re
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
-from ballpass.runtime.quantity.layout import is_reduced, needs
+from ballpass.runtime.quantity.layout import is_reduced, needed_rows
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
@@ -248,7 +248,7 @@ def simulate_many(
     in_lanes = driver is not None and lanes and at_kinks != LOCATED
     by_steps = [item for item in chosen if is_reduced(model, item)]
     others = [item for item in chosen if not is_reduced(model, item)]
-    reduced = {name for item in by_steps for name in needs(item)}
+    reduced = {row for item in by_steps for row in needed_rows(item)}
     work = Work(
         model=model,
         driver=driver,

@@ -32,13 +32,9 @@ SWITCHES = "switches.h"
 #: Packing scalars of short dependent chains costs more than it saves.
 FLAGS = ("-O3", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
 
-#: Of drivers without lanes, behind these: two thirds of the time of -O3 to compile, for the same speed and bits.
-SINGLE = "-O2"
-
 #: Of gcc, which else spends half its time on registers of Jacobians with ten thousand lines: four bearings compile in
-#: two thirds of the time, and the code of one bearing is nearly the same; and whose -O2 makes vectors of no loop that
-#: may end amid one: reductions took a fifth more.
-GCC_FLAGS = ("--param", "lra-max-considered-reload-pseudos=50", "-fvect-cost-model=dynamic")
+#: two thirds of the time, and the code of one bearing is nearly the same.
+GCC_FLAGS = ("--param", "lra-max-considered-reload-pseudos=50")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +60,7 @@ _REDUCTIONS = (*_DERIVATIVES, "ensemble_kernels.h")
 
 #: Drivers of single runs: with reductions, which cost a run that does not ask for them nothing that can be measured;
 #: with derivatives; with steps that end on the kinks of the laws.
-PLAIN = DriverSources(kind="stepper", headers=_REDUCTIONS, flags=(SINGLE, "-DBALLPASS_REDUCTIONS"))
+PLAIN = DriverSources(kind="stepper", headers=_REDUCTIONS, flags=("-DBALLPASS_REDUCTIONS",))
 DIFFERENTIATING = DriverSources(kind="stepper", headers=_DERIVATIVES, flags=("-DBALLPASS_SENSITIVITIES",))
 #: With derivatives, and steps that end on kinks of the laws, and where loads switch as the motion decides.
 DIFFERENTIATING_LOCATED = DriverSources(
@@ -73,7 +69,7 @@ DIFFERENTIATING_LOCATED = DriverSources(
     flags=("-DBALLPASS_SENSITIVITIES", "-DBALLPASS_LOCATED"),
 )
 LOCATING = DriverSources(
-    kind="locating", headers=(*_REDUCTIONS, SWITCHES), flags=(SINGLE, "-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
+    kind="locating", headers=(*_REDUCTIONS, SWITCHES), flags=("-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
 )
 
 #: Driver of ensembles, with that of single runs.

@@ -11,7 +11,7 @@ the inner ring turns against the outer one, for fatigue counts passes.  Behind a
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TypeAlias
@@ -40,13 +40,14 @@ DEFLECTION = "ball.deflection"
 #: What is wanted of it in rows that do not ask for it.
 GUARD = 0.5
 
-#: What a row holds of every channel.
-ROWS = (
-    "wanted",
-    *(f"{name}{what}" for name in EXTREMES for what in ("", "_time", "_ball")),
-    "shift",
-    *MOMENTS,
-)
+
+def row_names() -> tuple[str, ...]:
+    """What a row holds of every channel: first whether each extreme and each moment is wanted."""
+    extremes = (f"{name}{what}" for name in EXTREMES for what in ("", "_time", "_ball"))
+    return (*(f"{name}_wanted" for name in (*EXTREMES, *MOMENTS)), *extremes, "shift", *MOMENTS)
+
+
+ROWS = row_names()
 
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball, in the order of
 #: the generated kernel; whether they jump where a contact begins or ends.
@@ -138,19 +139,29 @@ class ReductionRows:
         """Place of an entry of `ROWS` in a row."""
         return self._columns[kind, channel]
 
-    def empty(self, count: int, start: ArrayLike, channels: Collection[str]) -> np.ndarray:
-        """Rows of reductions of these channels that count from `start` on [s], shape (count, size).
+    def all_of(self, channels: Iterable[str]) -> list[tuple[str, str]]:
+        """All extremes and moments of these channels, for `empty`."""
+        return [(name, channel) for channel in channels for name in (*EXTREMES, *MOMENTS)]
 
-        The deflection of the balls is always among them: it shows whether a bearing can be so.
+    def empty(self, count: int, start: ArrayLike, wanted: Collection[tuple[str, str]]) -> np.ndarray:
+        """Rows of reductions that count from `start` on [s], shape (count, size).
+
+        Parameters
+        ----------
+        wanted : extremes and moments, each of a channel.  The highest deflection of the balls is always among them: it
+            shows whether a bearing can be so.
         """
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")] = start
-        # what a power is made of is wanted with it
-        below = (n.removesuffix(power.name) + power.of for n in channels for power in POWERS if n.endswith(power.name))
-        wanted = {*channels, *below}
-        for name in self.channels:
-            guard = GUARD if name.endswith(DEFLECTION) else 0.0
-            rows[:, self.column("wanted", name)] = 1.0 if name in wanted else guard
+        for channel in self.channels:
+            if channel.endswith(DEFLECTION):
+                rows[:, self.column("max_wanted", channel)] = GUARD
+        for name, channel in wanted:
+            rows[:, self.column(f"{name}_wanted", channel)] = 1.0
+            for power in POWERS:  # what a power is made of is wanted with it
+                if power.of and channel.endswith(power.name):
+                    below = channel.removesuffix(power.name) + power.of
+                    rows[:, self.column(f"{name}_wanted", below)] = 1.0
         return rows
 
 
@@ -214,7 +225,8 @@ enum {{
    raceway. */
 enum {{
     {", ".join(places)},
-    BP_WANTED = {kinds["wanted"]},
+    BP_WANTED = {kinds[ROWS[0]]}, /* extremes, then moments: 0 where it is not */
+    BP_WANTED_MOMENT = BP_WANTED + BP_EXTREMES * BP_CHANNELS,
     BP_EXTREME = {kinds[next(iter(EXTREMES))]},
     BP_SHIFT = {kinds["shift"]},
     BP_MOMENT = {kinds[next(iter(MOMENTS))]},

@@ -61,7 +61,7 @@ async function solve(values, stale) {
   while (time(first) < least) first += 1;
   const reduced = inMemory(machine.reduction, solver.reduction.size).fill(0); // the highest ball forces, of every step
   reduced[solver.reduction.from] = least * (1 - 1e-9);
-  for (const { top, deflection } of solver.bearings) reduced[top.wanted] = reduced[deflection.wanted] = 1;
+  for (const { top, deflection } of solver.bearings) reduced[top.max_wanted] = reduced[deflection.max_wanted] = 1;
   machine.ballpass_reduce(machine.one, machine.reduction);
   const blocks = [], rows = [], nodes = [], states = [], apart = 1e-10 * whole; // closer than this a sample and a switch are one time
   for (let k = 0, end = 0; k <= count; k = end) {

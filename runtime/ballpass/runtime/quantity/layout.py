@@ -383,6 +383,11 @@ def needs(quantity: Quantity) -> tuple[str, ...]:
     return kind.needs(quantity.channel) if kind.needs is not None else (quantity.channel,)
 
 
+def needed_rows(quantity: Quantity) -> list[tuple[str, str]]:
+    """Extremes and moments that are reduced for a quantity, each of a channel."""
+    return [(row, channel) for channel in needs(quantity) for row in kind_of(quantity).rows]
+
+
 def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
     """Whether the reductions of a run hold a quantity."""
     if kind_of(quantity).reduced is None or quantity.ball is not None or not model.states:

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.reduction_rows import EXTREMES, reduction_rows
 from ballpass.runtime.quantity.between_nodes import Extreme
-from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, channels_of, is_reduced, kind_of, needs
+from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, channels_of, is_reduced, kind_of, needed_rows
 from ballpass.runtime.quantity.location import Moment, place_of, place_slope
 from ballpass.runtime.quantity.nodes import (
     Edges,
@@ -277,9 +277,9 @@ class QuantityRun:
 
     def _row(self, run: Run) -> Array:
         """An empty row of reductions, of what the quantities need."""
-        needed = {name for item in self._reduced for name in needs(item)}
+        needed = {row for item in self._reduced for row in needed_rows(item)}
         if self._motion:
-            needed |= set(self.model.states)
+            needed |= {(name, state) for name in EXTREMES for state in self.model.states}
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])
 
     def _moving_edges(self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> Edges:

@@ -86,6 +86,7 @@ class Kind:
     beside : further channels that it needs, after the bearing's prefix
     reduced : value from the reductions of runs, shape (runs,); None where they do not hold it
     needs : channels that are reduced for it, from its own; None for that one
+    rows : of each the extremes and moments
     """
 
     name: str
@@ -108,6 +109,7 @@ class Kind:
     beside: tuple[str, ...] = ()
     reduced: Callable[[ReducedRuns, Quantity], Array] | None = None
     needs: Callable[[str], tuple[str, ...]] | None = None
+    rows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

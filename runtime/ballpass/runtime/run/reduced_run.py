@@ -62,7 +62,7 @@ class ReducedRun:
         """Those since the last time that they were taken."""
         found = self.reductions()
         layout = reduction_rows(self.run.model.manifest)
-        self.row[:] = layout.empty(1, self.going.time, self.channels)[0]
+        self.row[:] = layout.empty(1, self.going.time, layout.all_of(self.channels))[0]
         return found
 
     def reductions(self) -> Reductions:
@@ -89,5 +89,6 @@ def start_reducing(run: Run, channels: Collection[str]) -> ReducedRun:
     RequestError
         The run ends within its transient.
     """
-    row = reduction_rows(run.model.manifest).empty(1, run.check_steady().start, channels)[0]
+    layout = reduction_rows(run.model.manifest)
+    row = layout.empty(1, run.check_steady().start, layout.all_of(channels))[0]
     return ReducedRun(going=start_run(run, [ReductionRow(row=row)]), row=row, channels=tuple(channels))

@@ -67,7 +67,8 @@ def simulate(
             directions.control(tolerance("sensitivity_rtol", request.sensitivity_rtol), run.magnitude)
     trajectory = start_trajectory(run, sampling)
     channels = reduced_channels(model.manifest, sampling.outputs)
-    rows = reduction_rows(model.manifest).empty(2, [run.start, 0.0], channels)
+    layout = reduction_rows(model.manifest)
+    rows = layout.empty(2, [run.start, 0.0], layout.all_of(channels))
     by_stepper = run.method in STEPPERS
     reducing = by_stepper and channels and directions is None
     going: RunUnderWay | None = None

@@ -145,6 +145,7 @@ KINDS = (
         evaluate=lambda view, quantity: _extreme(view, quantity, "max"),
         extremes=("max",),
         reduced=lambda runs, quantity: runs.entry("max", quantity.channel),
+        rows=("max",),
     ),
     Kind(
         name="min",
@@ -153,6 +154,7 @@ KINDS = (
         evaluate=lambda view, quantity: _extreme(view, quantity, "min"),
         extremes=("min",),
         reduced=lambda runs, quantity: runs.entry("min", quantity.channel),
+        rows=("min",),
     ),
     Kind(
         name="range",
@@ -160,6 +162,7 @@ KINDS = (
         evaluate=_range,
         extremes=("max", "min"),
         reduced=_reduced_range,
+        rows=("max", "min"),
     ),
     Kind(
         name="peak_time",
@@ -170,6 +173,7 @@ KINDS = (
         extremes=("max",),
         around=True,
         reduced=lambda runs, quantity: runs.entry("max_time", quantity.channel),
+        rows=("max",),
     ),
     Kind(
         name="min_time",
@@ -180,6 +184,7 @@ KINDS = (
         extremes=("min",),
         around=True,
         reduced=lambda runs, quantity: runs.entry("min_time", quantity.channel),
+        rows=("min",),
     ),
     Kind(
         name="peak_ball",
@@ -189,5 +194,6 @@ KINDS = (
         evaluate=_peak_ball,
         extremes=("max",),
         reduced=lambda runs, quantity: runs.entry("max_ball", quantity.channel),
+        rows=("max",),
     ),
 )

@@ -193,6 +193,7 @@ def _kind(name: str) -> Kind:
         beside=PLACES,
         reduced=lambda runs, quantity: _reduced(runs, quantity, readings),
         needs=lambda channel: _needs(channel, readings),
+        rows=("integral",),
     )
 
 

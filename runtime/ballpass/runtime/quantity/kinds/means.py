@@ -48,13 +48,20 @@ def _reduced_rms(runs: ReducedRuns, quantity: Quantity) -> Array:
 
 
 KINDS = (
-    Kind(name="mean", summary="mean over time", evaluate=_mean, reduced=_reduced_mean),
+    Kind(name="mean", summary="mean over time", evaluate=_mean, reduced=_reduced_mean, rows=("integral",)),
     Kind(
         name="integral",
         summary="integral over time; of a power the work",
         unit_of=lambda unit: _OVER_TIME.get(unit, f"{unit}*s"),
         evaluate=_integral,
         reduced=lambda runs, quantity: _reduced_mean(runs, quantity) * runs.duration,
+        rows=("integral",),
     ),
-    Kind(name="rms", summary="root mean square over time, with the mean in it", evaluate=_rms, reduced=_reduced_rms),
+    Kind(
+        name="rms",
+        summary="root mean square over time, with the mean in it",
+        evaluate=_rms,
+        reduced=_reduced_rms,
+        rows=("integral", "square"),
+    ),
 )
