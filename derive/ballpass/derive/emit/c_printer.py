@@ -8,6 +8,7 @@ this text.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import casadi as ca
@@ -55,6 +56,9 @@ _TEXTS = {
     ca.OP_IF_ELSE_ZERO: "({0} != 0.0 ? {1} : 0.0)",
 }
 
+#: An instruction of a function, asked for once: its operation, where its result goes, where its arguments are.
+_Step = tuple[int, list[int], list[int]]
+
 
 def print_function(
     function: ca.Function,
@@ -92,20 +96,23 @@ def print_function(
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
     name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
     head = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
-    head += _unused(function)
+    steps: list[_Step] = [
+        (function.instruction_id(k), function.instruction_output(k), function.instruction_input(k))
+        for k in range(function.n_instructions())
+    ]
+    head += _unused(function, steps)
     body: list[str] = []
     if lanes:
         body += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
     indent = "        " if lanes else "    "
     declared: set[int] = set()
-    inverses = _shared_divisors(function)
-    exponents, silent = _fractional_exponents(function)
+    inverses = _shared_divisors(steps)
+    exponents, silent = _fractional_exponents(function, steps)
     #: of each register, what holds its present value; in lanes what all share is computed before the loop: a choice
     #: that all lanes share, or a number that only one side of a choice loads, keep gcc from making vectors
     held: dict[int, str] = {}
     shared: set[str] = set()
-    for k in range(function.n_instructions()):
-        operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+    for k, (operation, out, take) in enumerate(steps):
         if k in silent:
             continue
         if operation == ca.OP_OUTPUT:
@@ -151,17 +158,16 @@ def print_function(
     return "\n".join([*head, *body, *(["    }"] if lanes else []), "}"])
 
 
-def _fractional_exponents(function: ca.Function) -> tuple[dict[int, Fraction], set[int]]:
+def _fractional_exponents(function: ca.Function, steps: Sequence[_Step]) -> tuple[dict[int, Fraction], set[int]]:
     """Exponents of powers that `bp_power` has, by instruction, and the constants that nothing else uses."""
     made_by: dict[int, int] = {}
     found: dict[int, Fraction] = {}
     silent: set[int] = set()
     used: set[int] = set()
-    for k in range(function.n_instructions()):
-        operation, take = function.instruction_id(k), function.instruction_input(k)
+    for k, (operation, out, take) in enumerate(steps):
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
             held = made_by[take[1]]
-            if function.instruction_id(held) == ca.OP_CONST:
+            if steps[held][0] == ca.OP_CONST:
                 exponent = function.instruction_constant(held)
                 near = Fraction(exponent).limit_denominator(HIGHEST_ROOT)
                 if near.denominator > 2 and abs(float(near) - exponent) < 1e-14:
@@ -170,11 +176,11 @@ def _fractional_exponents(function: ca.Function) -> tuple[dict[int, Fraction], s
         if operation != ca.OP_INPUT:
             used |= {made_by[place] for place in take}
         if operation != ca.OP_OUTPUT:
-            made_by[function.instruction_output(k)[0]] = k
+            made_by[out[0]] = k
     return found, silent - used
 
 
-def _shared_divisors(function: ca.Function) -> dict[int, tuple[str, bool]]:
+def _shared_divisors(steps: Sequence[_Step]) -> dict[int, tuple[str, bool]]:
     """Divisions by a number that other divisions share, by instruction: the name of its inverse, and whether it is
     the first.
 
@@ -182,12 +188,11 @@ def _shared_divisors(function: ca.Function) -> dict[int, tuple[str, bool]]:
     """
     made_by: dict[int, int] = {}
     divisions: dict[int, list[int]] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
+    for k, (operation, out, take) in enumerate(steps):
         if operation == ca.OP_DIV:
-            divisions.setdefault(made_by[function.instruction_input(k)[1]], []).append(k)
+            divisions.setdefault(made_by[take[1]], []).append(k)
         if operation != ca.OP_OUTPUT:
-            made_by[function.instruction_output(k)[0]] = k
+            made_by[out[0]] = k
     shared = [places for places in divisions.values() if len(places) > 1]
     return {k: (f"i{number}", k == places[0]) for number, places in enumerate(shared) for k in places}
 
@@ -207,11 +212,7 @@ def _literal(value: float) -> str:
     return text if any(mark in text for mark in ".en") else text + ".0"
 
 
-def _unused(function: ca.Function) -> list[str]:
+def _unused(function: ca.Function, steps: Sequence[_Step]) -> list[str]:
     """Silence warnings on arguments a model does not need."""
-    used = {
-        function.instruction_input(k)[0]
-        for k in range(function.n_instructions())
-        if function.instruction_id(k) == ca.OP_INPUT
-    }
+    used = {take[0] for operation, _, take in steps if operation == ca.OP_INPUT}
     return [f"    (void){function.name_in(k)};" for k in range(function.n_in()) if k not in used]
