@@ -48,7 +48,7 @@ Vary = Annotated[
         names=option_names.ranges(),
     ),
 ]
-Signals = Annotated[
+SignalColumns = Annotated[
     str | Sequence[str] | None,
     Option(
         words="Output that a column holds; else columns are named as outputs. May be repeated.",
@@ -112,7 +112,7 @@ def fit(
     model: AnyModel,
     data: Data,
     vary: Vary,
-    signal: Signals = None,
+    signal: SignalColumns = None,
     *,
     begin: Begin = None,
     shift: Shift = None,
