@@ -439,3 +439,9 @@ def test_a_lost_worker_loses_no_finished_chunk(rotor: Model, tmp_path: Path, int
     after = chunk_files(tmp_path / "b", "inner.x")
     assert {name: after[name] for name in finished} == finished
     xarray.testing.assert_identical(read(tmp_path / "a"), read(tmp_path / "b"))
+
+
+def test_a_pipe_in_the_place_of_a_data_set_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(pipe := tmp_path / "pipe.nc")
+    with pytest.raises(RequestError, match="this is no regular file"):
+        data_set_store.read_finished(pipe, {})

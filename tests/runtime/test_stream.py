@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tracemalloc
 from pathlib import Path
 
@@ -79,5 +80,11 @@ def test_what_cannot_be_streamed_is_refused_and_leaves_the_file(rotor: Model, tm
         rotor.stream(tmp_path / "missing" / "x.nc", sample_rate=1e4, duration=0.1)
     with pytest.raises(RequestError, match="both given"):
         rotor.simulate(duration=0.1, sample_rate=1e4, samples_per_cycle=100)
+    os.mkfifo(pipe := tmp_path / "pipe.nc")
+    for write in (lambda: rotor.stream(pipe, sample_rate=1e4, duration=0.1), lambda: rotor.simulate(1).save(pipe)):
+        with pytest.raises(RequestError, match="this is no regular file"):
+            write()
+    assert pipe.is_fifo()  # as root, a device had become a file
+    pipe.unlink()
     assert path.read_text() == "kept"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.nc"]

@@ -70,8 +70,15 @@ def read_whole(folder: Path, read: Callable[[], _Content], fault: type[Exception
             return read()
 
 
+def refuse_other(path: Path) -> None:
+    """OSError where a pipe or device is, whose place a file would take."""
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "this is no regular file", str(path))
+
+
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file: the old one or the new one, never half of it."""
+    refuse_other(path)
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
     try:
         with os.fdopen(descriptor, "wb") as stream:

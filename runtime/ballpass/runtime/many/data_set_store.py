@@ -20,6 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.folders import refuse_other
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.signals import Made
 
@@ -340,6 +341,7 @@ def read_finished(path: Path, spec: Mapping[str, Any]) -> tuple[MemberFailure, .
     import h5netcdf
 
     try:
+        refuse_other(path)
         with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
             refuse_changed(path, dict(file.attrs), spec)
             return read_failures({name: file.variables[name][...] for name in ("status", "failure")})

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folders import refuse_full_disk
+from ballpass.runtime.contract.folders import refuse_full_disk, refuse_other
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
@@ -172,6 +172,7 @@ def _seal(path: Path) -> None:
 @contextmanager
 def _replaced(path: Path) -> Iterator[Path]:
     """A place beside a file, to be put in its place when all went well."""
+    refuse_other(path)
     with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}-") as folder:
         made = Path(folder) / path.name
         yield made
