@@ -79,6 +79,8 @@ phase = "0 deg"
         nearest = np.argmin(np.abs(found.position[list(found.highest)] - frequency))
         assert found.names[nearest] == "load push"
         assert [mark.name for mark in model.spectrum("load.x").marks] == ["shaft", "load push"]
+    turning = model.spectrum("load.x", parameters={"loads.push.frequency": 50.0})
+    assert ([mark.name for mark in turning.marks], turning.names[0]) == (["shaft"], "shaft")
 
 
 def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:

@@ -52,7 +52,8 @@ class LifeReport(Reported):
     def unsettled(self) -> tuple[str, ...]:
         """Sentences about lives that more turns would change."""
         return tuple(
-            f"{f'State {state.name}: ' if state.name else ''}{_turns_words(state)} Take more: --cycles."
+            f"{f'State {state.name}: ' if state.name else ''}{_turns_words(state)} "
+            "Take more: --cycles; of a load or speed over time those of a whole cycle of work."
             for state in self.states
             if not state.settled
         )

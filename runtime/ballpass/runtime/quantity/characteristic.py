@@ -37,6 +37,9 @@ TURNS, APART, MOST = 100, 5.0, 400
 #: Names of what is of a bearing.
 OF_BEARINGS = ("FTF", "BPFO", "BPFI", "2 BSF")
 
+#: A harmonic load this close to a multiple of the shaft is one of its lines [1].
+LOCKED = 1e-9
+
 #: Speeds of the balls over both rings, behind the path of a bearing.
 PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
 
@@ -101,7 +104,7 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
 def characteristic_lines(
     manifest: Manifest, values: Mapping[str, float], *, orders: bool = False
 ) -> tuple[CharacteristicLine, ...]:
-    """Lines of the shaft, of harmonic loads and of every bearing; none where nothing turns.
+    """Lines of the shaft, of harmonic loads that do not go with it, and of every bearing; none where nothing turns.
 
     Parameters
     ----------
@@ -122,6 +125,9 @@ def characteristic_lines(
     for rate in driver_angle.harmonic_rates(manifest):
         name = rate.removesuffix(driver_angle.HARMONIC).replace("loads.", "load ")
         frequency = abs(values[rate]) / driver_angle.TURN / unit
+        order = frequency / shaft * parts
+        if abs(order - round(order)) < LOCKED:
+            continue
         found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=0.0, side_name=""))
     for bearing in manifest.bearings:
         one = frequencies_of(bearing, values)
