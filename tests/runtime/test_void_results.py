@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from typer.testing import CliRunner
 from ballpass.runtime import IntegrationError, Model, SimulationError, UnusualWarning
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.run.failure_location import FailureLocation
 
 #: The load of a rotor, of which 196 N flatten by 4 um: so much flattens by about a millimetre, of 11 mm.
 FORCE = "load.force.x"
@@ -48,8 +50,15 @@ def test_commands_end_with_what_to_change(words: str, scene: Path) -> None:
     said = " ".join(done.stderr.split())
     assert "a ball is flattened by" in said
     assert "Reduce load, speed or clearance" in said
-    if deflected := re.search(r"flattened by ([\d.]+) mm.*Most deflected there: .*, by (\d+) um", said):
+    if deflected := re.search(r"flattened by ([\d.]+) mm.*Most deflected there: .*, by (\d+) µm", said):
         assert float(deflected[2]) == pytest.approx(1e3 * float(deflected[1]), abs=1.0)
+
+
+def test_where_no_ball_touches_none_is_named_as_most_deflected() -> None:
+    """It was "ball 6, by -4.999e+08 um" of a clearance of a kilometre."""
+    there = FailureLocation(crank_angle=0.0, bearing="", ball=6, ball_angle=0.5, deflection=-500.0)
+    assert there.words == "No ball is in contact there."
+    assert replace(there, deflection=0.0147).words.endswith("ball 6 at 28.65 deg, by 14700 µm.")
 
 
 def test_lanes_find_the_members_that_are_void_alone(make_model: Callable[..., Model]) -> None:
@@ -114,7 +123,7 @@ def test_the_failure_is_at_the_moment_of_the_largest_flattening(make_model: Call
     deflections = found["ball.deflection"]
     assert np.argmax(deflections.max(axis=1)) >= len(deflections) - 2
     assert np.argmax(deflections[-1]) + 1 == failure.ball
-    assert f"by {1e6 * deflections.max():.4g} um" in str(failure)
+    assert f"by {1e6 * deflections.max():.4g} µm" in str(failure)
 
 
 def test_a_void_start_of_a_run_that_counts_later_is_a_warning(make_model: Callable[..., Model]) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
+from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.magnitudes import mass_matrix
@@ -45,9 +46,11 @@ class FailureLocation:
         """A sentence on the ball; empty without one."""
         if self.ball is None:
             return ""
+        if self.deflection <= 0.0:
+            return "No ball is in contact there."
         angle = math.degrees(self.ball_angle)
         ball = f"ball {self.ball}" + (f" of {self.bearing}" if self.bearing else "")
-        return f"Most deflected there: {ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."
+        return f"Most deflected there: {ball} at {angle:.2f} deg, by {rounded(1e6 * self.deflection)} µm."
 
 
 def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> FailureLocation:
