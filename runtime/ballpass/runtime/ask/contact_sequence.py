@@ -111,7 +111,7 @@ class ContactSequence:
         return (self.touching, self.behind) == (other.touching, other.behind)
 
 
-def contact_sequence(shooting: Shooting, nodes: np.ndarray, value: float | None) -> ContactSequence:
+def contact_sequence(shooting: Shooting, nodes: np.ndarray, value: float | None = None) -> ContactSequence:
     """Contacts along the motion from these states at the segments' starts, shape (segments, states).
 
     Raises

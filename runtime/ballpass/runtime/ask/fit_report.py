@@ -213,11 +213,7 @@ class FitAnswer(ShortRepr, Reported):
                 for one in self.signals
             ],
             "starts": [{"start": list(start), "end": end} for start, end in self.starts],
-            "rivals": [list(one) for one in self.rivals],
-            "loss": self.loss,
-            "profile": self.profile,
-            "rtol": self.rtol,
-            "converged": self.converged,
+            **self._named("rivals", "loss", "profile", "rtol", "converged"),
         }
         fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."
         records = [asdict(one) for one in self.numbers]

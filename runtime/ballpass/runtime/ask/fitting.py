@@ -67,7 +67,6 @@ class Fitted:
     spread : deviations of unknowns are multiplied by it for an interval
     scale : growth of twice the cost that is one of a squared deviation [1]
     converged : whether the search ended by itself
-    evaluations : of the model
     """
 
     counts: np.ndarray
@@ -81,7 +80,6 @@ class Fitted:
     spread: float
     scale: float
     converged: bool
-    evaluations: int
 
 
 class _Weighted:
@@ -89,7 +87,6 @@ class _Weighted:
 
     def __init__(self, misfit: Misfit, noise: np.ndarray) -> None:
         self.misfit, self.noise = misfit, noise
-        self.evaluations = 0
         self._at = np.zeros(0)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
         self.fault: BallpassError | None = None
@@ -97,7 +94,6 @@ class _Weighted:
     def _evaluate(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         if not np.array_equal(counts, self._at):
             self._at = counts.copy()
-            self.evaluations += 1
             try:
                 found = self.misfit.outputs(counts)
             except BallpassError as fault:
@@ -213,12 +209,11 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
     from scipy.stats import t as student
 
     noise = np.array([record.noise for record in misfit.records])
-    counts, evaluations = start, 0
+    counts = start
     samples = sum(len(record.values) for record in misfit.records)
     for weighing in range(WEIGHINGS):
         weighted = _Weighted(misfit, noise)
         counts, cost, converged = search(weighted, counts, loss, {})
-        evaluations += weighted.evaluations
         whole, jacobian = weighted.differences(counts), weighted.jacobian(counts)
         ends = np.cumsum([len(record.values) for record in misfit.records])[:-1]
         parts = [size * part for size, part in zip(noise, np.split(whole, ends), strict=True)]
@@ -251,7 +246,6 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
         spread=float(student.ppf(0.5 + 0.5 * CONFIDENCE, samples - len(counts))),
         scale=scale,
         converged=converged,
-        evaluations=evaluations,
     )
 
 

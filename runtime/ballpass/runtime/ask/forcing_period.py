@@ -174,8 +174,12 @@ def phase_drifts(
     ----------
     times, states : as for `forcing_period`
     """
-    found = {}
-    for rate, alike in _rates(model, numbers, times, states).items():
+    found: dict[str, float] = {}
+    try:
+        rates = _rates(model, numbers, times, states)
+    except RequestError:  # what follows a table over time has no phase
+        return found
+    for rate, alike in rates.items():
         rounds = abs(numbers.values[rate]) * alike * every / driver_angle.TURN
         if abs(rounds - round(rounds)) > EXACT * rounds:
             found[rate] = rounds % 1.0

@@ -113,7 +113,7 @@ class Shooting:
     over: str
     parts: KeptParts
 
-    def numbers(self, value: float | None) -> Numbers:
+    def numbers(self, value: float | None = None) -> Numbers:
         """Numbers of the model with this value of the varied parameter."""
         given = dict(self.parameters) if value is None else {**self.parameters, self.over: value}
         return self.model.numbers(given)
@@ -171,7 +171,7 @@ class Shooting:
             monodromy = flow @ monodromy
         return left.ravel(), by_states.reshape(nodes.size, nodes.size), by_parameter.ravel(), monodromy
 
-    def change(self, nodes: np.ndarray, value: float | None = None) -> float:
+    def change(self, nodes: np.ndarray) -> float:
         """Largest of what a period leaves from these states, by runs without derivatives.
 
         Raises
@@ -179,7 +179,7 @@ class Shooting:
         IntegrationError
             A run failed.
         """
-        numbers = self.numbers(value)
+        numbers = self.numbers()
         rtol = DERIVATIVE_RTOL if self.rtol is None else self.rtol
         ends = [
             simulate(self.model, numbers, self._request(nodes, k, numbers, rtol)).x[-1] for k in range(self.segments)
@@ -193,7 +193,7 @@ class Shooting:
         begin = RunEnd(time=k * length, x=nodes[k].copy(), states=states, parameters=numbers.parameters)
         return Request(duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol)
 
-    def solve(self, nodes: np.ndarray, value: float | None = None) -> PeriodicState:
+    def solve(self, nodes: np.ndarray) -> PeriodicState:
         """Newton's iteration from these states, with shorter steps where a whole one lessens nothing.
 
         Raises
@@ -204,7 +204,7 @@ class Shooting:
         rough = ROUGH if self.rtol is None else max(self.rtol, ROUGH)
         tight = self.rtol is not None and self.rtol >= ROUGH
         close = max(CLOSE, 10.0 * (self.rtol or 0.0))  # a run is no more exact than its tolerance
-        now = self.residual(nodes, value, rough)
+        now = self.residual(nodes, None, rough)
         left, runs = [now.size], 1
         for _ in range(ITERATIONS):
             try:
@@ -217,7 +217,7 @@ class Shooting:
             share, small = 1.0, float(np.max(np.abs(step / self.magnitude)))
             if tight and small < SURE:
                 runs += 1
-                after = self.change(nodes + step, value)
+                after = self.change(nodes + step)
                 if after < close or small < close:
                     multipliers = np.linalg.eigvals(now.monodromy)
                     return PeriodicState(
@@ -231,7 +231,7 @@ class Shooting:
             for _ in range(HALVINGS):
                 runs += 1
                 with contextlib.suppress(IntegrationError):  # too long a step may end where no bearing can be
-                    then = self.residual(nodes + share * step, value, None if tight else rough)
+                    then = self.residual(nodes + share * step, None, None if tight else rough)
                     if then.size < now.size or small < NEAR:
                         break
                 share /= 2.0

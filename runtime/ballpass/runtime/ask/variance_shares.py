@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binomtest
 
 #: Resamples of a bootstrap.
 RESAMPLES = 500
-
-#: 95 % of a normal distribution lie within so many deviations.
-NORMAL = 1.959964
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +91,5 @@ def wilson(hits: int, members: int) -> tuple[float, float]:
     """95 % interval of a share by Wilson (1927), from independent members."""
     if not members:
         return 0.0, 1.0
-    share, z = hits / members, NORMAL**2 / members
-    middle = share + 0.5 * z
-    half = math.sqrt(z * (share * (1.0 - share) + 0.25 * z))
-    return max(0.0, (middle - half) / (1.0 + z)), min(1.0, (middle + half) / (1.0 + z))
+    interval = binomtest(hits, members).proportion_ci(method="wilson")
+    return float(interval.low), float(interval.high)

@@ -161,10 +161,7 @@ class Bifurcation(ShortRepr, Reported):
         facts = {
             "vary": self.vary.name,
             "vary_unit": self.vary.unit,
-            "state": self.state,
-            "unit": self.unit,
-            "every": self.every,
-            "apart": list(self.apart),
+            **self._named("state", "unit", "every", "apart"),
             "motions": records,
         }
         return Report(parts=(table, *said), facts=facts, records=records, index=("direction", "value"))
@@ -242,7 +239,7 @@ def bifurcation(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
-    strobe = _strobe(model, overrides, chosen)
+    step_of, every, drifts_of = _strobe(model, overrides, chosen)
     stopped, done = Event(), [0]
 
     def each() -> None:
@@ -259,15 +256,16 @@ def bifurcation(
             found, start = [], None
             for value in order.tolist():
                 given = {**overrides, chosen.name: value}
-                step = strobe.step(given)
+                step = step_of(given)
                 values = model.numbers(given).values
                 refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
                 states, growth, magnitude = parts.once(
                     np.array([value, *([] if start is None else start)]),
                     partial(_motion, model, given, step, start, readings, settling, rtol, exponent, each),
                 )
-                grown = exponent_of(growth, strobe.drifts(given)) if exponent else None
-                kind = kind_of_motion(states, magnitude, grown, forced=strobe.forced)
+                drifts = () if drifts_of is None else drifts_of(given)
+                grown = exponent_of(growth, drifts) if exponent else None
+                kind = kind_of_motion(states, magnitude, grown, forced=drifts_of is None)
                 found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind))
                 start = states[-1]
                 done[0] += 1
@@ -298,32 +296,19 @@ def bifurcation(
         state=state,
         unit=manifest.states[names.index(state)].unit,
         row=names.index(state),
-        every=strobe.words,
+        every=every,
         up=up,
         down=down,
         apart=apart,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Strobe:
-    """When states are read.
-
-    Attributes
-    ----------
-    step : time between readings, of overrides [s]
-    words : for people
-    forced : whether that is a period of the equations
-    drifts : of overrides, the parts of a round by which phases of the equations move from reading to reading
+def _strobe(
+    model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange
+) -> tuple[Callable[..., float], str, Callable[..., Collection[float]] | None]:
+    """Time between readings, of overrides, and words for it; where that is no period of the equations, the parts of a
+    round by which phases move from reading to reading.
     """
-
-    step: Callable[[Mapping[str, float]], float]
-    words: str
-    forced: bool
-    drifts: Callable[[Mapping[str, float]], Collection[float]]
-
-
-def _strobe(model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange) -> _Strobe:
     from ballpass.runtime.ask.forcing_period import common_period, phase_drifts
 
     first = {**parameters, vary.name: vary.low}
@@ -333,24 +318,17 @@ def _strobe(model: AnyModel, parameters: Mapping[str, float], vary: ParameterRan
     run = model.simulate(
         duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=first, outputs=[], progress=False
     )
-
-    def drifts(given: Mapping[str, float]) -> Collection[float]:
-        try:
-            return phase_drifts(model, model.numbers(given), run.t, run.x, model.period(given)).values()
-        except RequestError:  # loads or speeds by a table over time have no phase
-            return ()
-
     try:
         period = common_period(model, parameters, vary, run.t, run.x)
     except RequestError:  # no common period: readings are taken each turn, and the report says so
         period = None
     if period is not None and period.time(model.numbers(first).values) <= LONGEST_STROBE * turn:
-        words = f"each time {period.words}"
-        return _Strobe(
-            step=lambda given: period.time(model.numbers(given).values), words=words, forced=True, drifts=lambda _: ()
-        )
-    words = "once a turn, after which balls or loads are elsewhere"
-    return _Strobe(step=model.period, words=words, forced=False, drifts=drifts)
+        return (lambda given: period.time(model.numbers(given).values)), f"each time {period.words}", None
+
+    def drifts(given: Mapping[str, float]) -> Collection[float]:
+        return phase_drifts(model, model.numbers(given), run.t, run.x, model.period(given)).values()
+
+    return model.period, "once a turn, after which balls or loads are elsewhere", drifts
 
 
 def _motion(

@@ -212,22 +212,18 @@ class Optimum(ShortRepr, Reported):
                 "search did not evaluate it: the worst is larger than the value given. Give narrower tolerances."
             )
         facts = {
-            "goal": self.goal,
-            "unit": self.unit,
-            "value": self.value,
+            **self._named("goal", "unit", "value"),
             "parameters": rows,
             "kinked": self.kinked,
             "limits": [asdict(one) for one in self.limits],
             "verdicts": [list(pair) for pair in self.verdicts],
             "starts": [{"start": list(start), "end": end} for start, end in self.starts],
-            "trace": list(self.trace),
-            "converged": self.converged,
+            **self._named("trace", "converged"),
             "tolerances": [
                 {"parameter": one.name, "low": one.low, "high": one.high, "worst": value}
                 for one, value in zip(self.tolerances, self.worst, strict=True)
             ],
-            "nominal": self.nominal,
-            "further": self.further,
+            **self._named("nominal", "further"),
         }
         return Report(
             parts=(table, *said), facts=facts, records=rows, index=("parameter",), warnings=warned, fault=fault

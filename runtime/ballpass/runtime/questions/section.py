@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.invariant_curve import InvariantCurve
-    from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.run.solution import Solution
 
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
@@ -179,12 +177,7 @@ class PoincareSection(ShortRepr, Reported):
                 "or another angle (at); the Lyapunov exponent of ballpass bifurcation says whether it is chaotic."
             )
         facts = {
-            "angle": self.angle,
-            "turns": self.turns,
-            "around": self.around,
-            "others": list(self.others),
-            "kind": self.kind,
-            "period": self.period,
+            **self._named("angle", "turns", "around", "others", "kind", "period"),
             "drift": self.curve.drift if self.curve is not None else None,
             "harmonics": self.curve.harmonics if self.curve is not None else None,
             "states": records,
@@ -239,7 +232,7 @@ def section(
     >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
     True
     """
-    from ballpass.runtime.ask.forcing_period import refuse_changing, refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import own_phases, refuse_changing, refuse_free_driver
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
     from ballpass.runtime.run.ball_angles import ball_angles
@@ -269,7 +262,8 @@ def section(
     phase, around, curve = np.zeros(readings), PITCH, None
     others: tuple[str, ...] = ()
     if len(manifest.bearings) == 1:
-        others = _others(model, numbers, run, turns * turn)
+        pick = np.linspace(0, readings - 1, MOMENTS).astype(int)
+        others = tuple(own_phases(model, numbers, run.t[pick], run.x[pick], turns * turn))
         first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(run.t.tolist(), run.x, strict=True)]
         rounds = np.array(first) / math.tau
         phase = rounds * manifest.bearings[0].balls
@@ -293,14 +287,3 @@ def section(
         curve=curve,
         others=others,
     )
-
-
-def _others(model: AnyModel, numbers: Numbers, run: Solution, every: float) -> tuple[str, ...]:
-    """What turns beside the cage and stands elsewhere at each point; none is named of a table over time."""
-    from ballpass.runtime.ask.forcing_period import own_phases
-
-    pick = np.linspace(0, len(run.t) - 1, MOMENTS).astype(int)
-    try:
-        return tuple(own_phases(model, numbers, run.t[pick], run.x[pick], every))
-    except RequestError:
-        return ()

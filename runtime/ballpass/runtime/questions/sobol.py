@@ -192,14 +192,10 @@ class SobolAnswer(ShortRepr, Reported):
                 f"simulated. The first: {self.fault}"
             )
         facts = {
-            "inputs": list(self.inputs),
-            "distributions": list(self.distributions),
+            **self._named("inputs", "distributions"),
             "quantities": [asdict(one) for one in self.quantities],
             "limits": [asdict(one) for one in self.limits],
-            "samples": self.samples,
-            "seed": self.seed,
-            "members": self.members,
-            "failed": self.failed,
+            **self._named("samples", "seed", "members", "failed"),
             "first_fault": self.fault,
         }
         fault = "" if self.failed < self.members else "No member has a result."

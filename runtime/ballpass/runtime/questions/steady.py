@@ -225,21 +225,12 @@ class SteadyState(ShortRepr, Reported):
                 f"differ by {rounded(100.0 * self.difference, 2)} %. Loads or balls are elsewhere. Leave turns away."
             )
         facts = {
-            "period": self.period,
-            "turns": self.turns,
-            "forcing": self.forcing,
-            "repeats": self.repeats,
-            "sooner": self.sooner,
+            **self._named("period", "turns", "forcing", "repeats", "sooner"),
             "states": rows,
             "multipliers": [complex_facts(m) for m in self.multipliers.tolist()],
-            "resolution": self.resolution,
-            "stable": self.stable,
-            "kind": self.kind,
+            **self._named("resolution", "stable", "kind"),
             "contacts": contact_facts(self.contacts),
-            "left": list(self.left),
-            "segments": self.segments,
-            "integrated": self.integrated,
-            "difference": self.difference,
+            **self._named("left", "segments", "integrated", "difference"),
             "over": self.over.name if self.over else None,
             "over_unit": self.over.unit if self.over else None,
             "branches": [branch_facts(branch) for branch in self.branches],
@@ -309,7 +300,7 @@ def steady(
     numbers = model.numbers(given)
     turn = model.period(given)
     with kept_parts(keep, model, given, ends, turns, transient) as parts, shown("shooting", progress) as tell:
-        sampled = _transient(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
+        sampled = _run(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
         pick = np.linspace(0, len(sampled.t) - 1, MOMENTS).astype(int)
         moments = sampled.t[pick], sampled.x[pick]
         if ends is None or turns is not None:
@@ -329,14 +320,16 @@ def steady(
             parts=parts,
         )
         whole = math.floor(transient * turn / length + 1e-9) if math.isfinite(turn) else 0
-        begin = _begin(model, given, whole * length)
+        begin = np.array([numbers.values[name] for name in manifest.initial])
+        if whole:
+            begin = _run(model, given, whole * length, 1).x[-1]
         found, shooting = _solved(shooting, begin, fixed=segments is not None)
         sooner = _sooner(shooting, found)
         if sooner == 1 < repeats and repeats % 2 == 0:
             kicked = _kicked(shooting, found)
             found, sooner = (found, sooner) if kicked is None else (kicked, _sooner(shooting, kicked))
         branches, notes = ((), ()) if ends is None else _branches(shooting, found, ends, tell)
-        contacts = contact_sequence(shooting, found.nodes, given[ends.name] if ends else None)
+        contacts = contact_sequence(shooting, found.nodes)
     return SteadyState(
         states=tuple(info.name for info in manifest.states),
         units=tuple(info.unit for info in manifest.states),
@@ -360,12 +353,15 @@ def steady(
     )
 
 
-def _transient(model: AnyModel, parameters: Mapping[str, float], duration: float, samples: int) -> Solution:
-    """A run from the scene's start, without outputs."""
+def _run(
+    model: AnyModel, parameters: Mapping[str, float], duration: float, parts: int, initial: np.ndarray | None = None
+) -> Solution:
+    """A run without outputs, from the scene's start if no other is given, sampled at the ends of equal parts."""
     found: Solution = model.simulate(
         duration=duration,
         parameters=parameters,
-        times=np.linspace(0.0, duration, samples + 1),
+        initial=initial,
+        times=np.linspace(0.0, duration, parts + 1),
         outputs=[],
         transient=0.0,
         progress=False,
@@ -373,60 +369,39 @@ def _transient(model: AnyModel, parameters: Mapping[str, float], duration: float
     return found
 
 
-def _begin(model: AnyModel, parameters: Mapping[str, float], duration: float) -> np.ndarray:
-    """State after whole periods, shape (states,); the scene's where there are none."""
-    if duration > 0.0:
-        return np.asarray(_transient(model, parameters, duration, 1).x[-1])
-    numbers = model.numbers(parameters)
-    return np.array([numbers.values[name] for name in model.manifest.initial])
-
-
 def _nodes(shooting: Shooting, start: np.ndarray) -> np.ndarray:
     """States at the starts of the segments along a run, shape (segments, states)."""
     if shooting.segments == 1:
         return start[None, :]
-    model: AnyModel = shooting.model
-    length = shooting.repeats * shooting.period.time(model.numbers(shooting.parameters).values)
-    run = model.simulate(
-        duration=length,
-        parameters=shooting.parameters,
-        initial=start,
-        times=np.arange(shooting.segments) * length / shooting.segments,
-        outputs=[],
-        transient=0.0,
-        progress=False,
-    )
-    return np.asarray(run.x)
+    length = shooting.repeats * shooting.period.time(shooting.numbers().values)
+    return np.asarray(_run(shooting.model, shooting.parameters, length, shooting.segments, start).x[:-1])
 
 
 def _solved(shooting: Shooting, begin: np.ndarray, *, fixed: bool) -> tuple[PeriodicState, Shooting]:
     """The state, in more segments where one fails and none were asked for."""
-    value = shooting.parameters[shooting.over] if shooting.over else None
     try:
-        return shooting.solve(_nodes(shooting, begin), value), shooting
+        return shooting.solve(_nodes(shooting, begin)), shooting
     except SimulationError:
         if fixed:
             raise
     several = replace(shooting, segments=SEGMENTS)
-    return several.solve(_nodes(several, begin), value), several
+    return several.solve(_nodes(several, begin)), several
 
 
 def _sooner(shooting: Shooting, found: PeriodicState) -> int:
     """Periods of the equations after which the state is there again: a divisor of those that were asked for."""
-    value = shooting.parameters[shooting.over] if shooting.over else None
     for periods in range(1, shooting.repeats):
         if shooting.repeats % periods == 0:
             part = replace(shooting, repeats=periods, segments=1)
-            if part.residual(found.nodes[:1], value).size < REPEATS:
+            if part.residual(found.nodes[:1]).size < REPEATS:
                 return periods
     return shooting.repeats
 
 
 def _kicked(shooting: Shooting, found: PeriodicState) -> PeriodicState | None:
     """A state of twice the period beside an unstable one, sought along the direction that doubles it."""
-    value = shooting.parameters[shooting.over] if shooting.over else None
     single = replace(shooting, repeats=1, segments=1)
-    values, vectors = np.linalg.eig(single.residual(found.nodes[:1], value).monodromy)
+    values, vectors = np.linalg.eig(single.residual(found.nodes[:1]).monodromy)
     flip = int(np.argmin(np.abs(values + np.abs(values))))
     if values[flip].real > -1.0:
         return None
@@ -434,7 +409,7 @@ def _kicked(shooting: Shooting, found: PeriodicState) -> PeriodicState | None:
     along *= 1.0 / np.max(np.abs(along / shooting.magnitude))
     for kick in KICKS:
         try:
-            other = shooting.solve(_nodes(shooting, found.nodes[0] + kick * along), value)
+            other = shooting.solve(_nodes(shooting, found.nodes[0] + kick * along))
         except SimulationError:
             continue
         if _sooner(shooting, other) == shooting.repeats:

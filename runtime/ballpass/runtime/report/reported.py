@@ -20,6 +20,10 @@ class Reported:
     def _report(self) -> Report:
         raise NotImplementedError
 
+    def _named(self, *names: str) -> dict[str, Any]:
+        """Attributes by name, as facts of a report."""
+        return {name: getattr(self, name) for name in names}
+
     def report(self) -> Report:
         """The report of the answer: sentences, tables, plain data.
 
