@@ -71,6 +71,11 @@ NAMED: dict[str, dict[str, str]] = {
         "repeat after n, up to 16.": "`LONGEST` of ask/lyapunov.py",
         "ratio 409/1072) repeats after 134 turns only": "(1 - 7.9375/33.5)/2; test_steady.py",
         "In Fig. 7 of the paper": "the paper's figure",
+        "clearance of 40 µm the paper's press is chaotic: +4.2 a turn": "ADR 0032",
+        "40 µm lies in a periodic window within": "test_bifurcation.py",
+        "−0.297, and +1.6 at 39.9 µm": "ADR 0032",
+        "at 30 µm with 3/8": "31.75 mm in the block",
+        "chaotic for some 1650 turns": "ADR 0032",
     },
     "docs/howto/steady.md": {
         "cage ratio of 409/1072, and repeats after 134 turns": "(1 - 7.9375/33.5)/2; test_steady.py",

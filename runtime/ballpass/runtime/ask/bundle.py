@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 #: First and largest half width of the box, and that at which the search is done; most evaluations.
-BOX, DONE, EVALUATIONS = 0.1, 1e-7, 120
+BOX, DONE, EVALUATIONS = 0.1, 1e-7, 300
 
 #: Planes within so many half widths of the best point are taken: a box is halved after a step to its edge [1].
 NEAR = 4.5

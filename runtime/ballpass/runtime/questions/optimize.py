@@ -204,7 +204,7 @@ class Optimum(ShortRepr, Reported):
         elif broken:
             fault = f"No values within the bounds keep the limit of {', '.join(broken)}."
         elif not self.converged:
-            fault = "The search did not end by itself. Give more starts or narrower bounds."
+            fault = "The search did not end by itself. Give more starts, narrower bounds, or another search: slsqp."
         warned = []
         if self.further > self.value + WORSE * abs(self.value):
             warned.append(
