@@ -144,6 +144,13 @@ def test_lanes_are_a_fast_path_of_the_same_kinds(press: Model) -> None:
         assert lanes[name][0] == pytest.approx(single[name].value, rel=1e-5, abs=1e-12), name
 
 
+def test_a_method_that_is_named_is_that_of_derivatives_too(press: Model) -> None:
+    """`stepper` changes between explicit and linearly implicit steps; other methods give other bits."""
+    names, options = ["max:ball.force", "rms:inner.y"], {**RUN, "rtol": 1e-8, "kinks": "located", "method": "stepper"}
+    found = press.sensitivity(names, CLEARANCE, check=False, **options)
+    assert [one.value for one in found.quantities] == [one.value for one in press.quantities(names, **options).values()]
+
+
 def test_every_kind_has_an_error_and_a_derivative(press: Model, expected: dict[str, float]) -> None:
     """A run to a named error keeps it; derivatives are there, and verified or said to be none."""
     target = 1e-3

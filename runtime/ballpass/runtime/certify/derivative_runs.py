@@ -44,7 +44,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         looked_at = min(run_length(model, request, turn), SCALED_TURNS * turn)
         scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
-    method = fine if asked in ("auto", "stepper") else asked
+    method = fine if asked == "auto" else asked
     run = resolve(model, numbers, replace(request, method=method, kinks=None))
     check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before any long computation
     return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
