@@ -45,6 +45,8 @@ CHANGING_SLIP = """[bearing.cage]
 slip = { time = ["0 s", "0.03 s", "0.07 s"], value = [0.0, 0.3, 0.05], lag = "2 deg" }
 """
 LAGGING = EFFECTS.replace("[bearing.cage]\nslip = 0.03\n", CHANGING_SLIP)
+#: Rows so long that the slip is another than in the end at any time that is drawn.
+LAGGING_LONG = LAGGING.replace("0.07 s", "2 s")
 SPALLS = "".join(
     f'[bearing.defects.{name}]\non = "{on}"\n{"ball = 2" if on == "ball" else ""}\nangle = "{angle} deg"\n'
     f'chord = "{chord} mm"\nprofile = "{profile}"\n{depth}\n'

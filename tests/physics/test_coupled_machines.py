@@ -15,7 +15,7 @@ from coupled_scenes import (
     CHANGING_SLIP,
     EFFECTS,
     HUNT,
-    LAGGING,
+    LAGGING_LONG,
     ONE_SIDED,
     SPALLS,
     Derived,
@@ -123,17 +123,23 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "press, slip that changes": (
         "punching_press",
         (),
-        (bearing("A", "frame", effects=LAGGING + SPALLS), bearing("B", "rod", elastic=True, effects=LAGGING + SPALLS)),
+        (
+            bearing("A", "frame", effects=LAGGING_LONG + SPALLS),
+            bearing("B", "rod", elastic=True, effects=LAGGING_LONG + SPALLS),
+        ),
     ),
     "press, slip that changes, motor": (
         "punching_press",
         driven_by(MOTOR),
-        (bearing("A", count=2, effects=LAGGING + SPALLS, angle="25 deg"), bearing("B", "crank", effects=CHANGING_SLIP)),
+        (
+            bearing("A", count=2, effects=LAGGING_LONG + SPALLS, angle="25 deg"),
+            bearing("B", "crank", effects=CHANGING_SLIP.replace("0.07 s", "2 s")),
+        ),
     ),
     "press, slip that changes, run-up": (
         "punching_press",
         (*OFF_CENTRE, (SPEED, RUN_UP)),
-        (bearing("A", elastic=True, effects=LAGGING + SPALLS), bearing("B", "rod", effects=LAGGING)),
+        (bearing("A", elastic=True, effects=LAGGING_LONG + SPALLS), bearing("B", "rod", effects=LAGGING_LONG)),
     ),
     "press, unlike bearings side by side": (
         "punching_press",

@@ -14,7 +14,19 @@ import numpy as np
 import pytest
 from ball_effects import taken
 from comparison import drawn, power_imbalance
-from coupled_scenes import EFFECTS, LAGGING, POWERS, RUN, SPALLS, TANGENT, UNDAMPED, Derived, bearing, with_bearings
+from coupled_scenes import (
+    EFFECTS,
+    LAGGING,
+    LAGGING_LONG,
+    POWERS,
+    RUN,
+    SPALLS,
+    TANGENT,
+    UNDAMPED,
+    Derived,
+    bearing,
+    with_bearings,
+)
 from multibody import Multibody
 from virtual import virtual_model
 
@@ -61,7 +73,9 @@ ALL = EFFECTS + SPALLS
     [
         press(bearing("A", elastic=True, count=2, effects=ALL, angle="25 deg")),
         pytest.param(
-            press(bearing("A", "frame", effects=LAGGING), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR),
+            press(
+                bearing("A", "frame", effects=LAGGING_LONG), bearing("B", "rod", elastic=True, effects=ALL), drive=MOTOR
+            ),
             marks=pytest.mark.long,
         ),
     ],
