@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -248,6 +249,12 @@ def test_a_chaotic_motion_is_refused(press: Model) -> None:
 def test_wrong_requests_are_refused(press: Model, data: object, options: dict[str, str], words: str) -> None:
     with pytest.raises(RequestError, match=words):
         press.fit(data, f"{CLEARANCE}=5 um:30 um", **options)
+
+
+def test_a_pipe_is_no_record_and_not_waited_for(make_virtual: Callable[..., Model], tmp_path: Path) -> None:
+    os.mkfifo(pipe := tmp_path / "pipe.nc")
+    with pytest.raises(RequestError, match="it is not a NetCDF-4 file"):
+        read_trial(make_virtual("varying_compliance").manifest, str(pipe), {}, 1)
 
 
 def test_arrays_that_say_their_unit_are_taken_in_it(make_virtual: Callable[..., Model]) -> None:

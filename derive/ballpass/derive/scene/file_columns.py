@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.folders import read_file, refuse_other
 
 #: Bytes of a file of columns at most.
 LARGEST = 100_000_000
@@ -114,6 +114,7 @@ def _of_netcdf(file: Path, name: str, wanted: str) -> tuple[list[float], str]:
     import h5netcdf  # importing it takes longer than reading most scenes
 
     try:
+        refuse_other(file)
         stored = h5netcdf.File(file, "r")
     except (OSError, ValueError) as error:
         why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.folders import read_file, refuse_other
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.parameters import said_unit, unknown_name, wrong_unit
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
@@ -285,6 +285,7 @@ def _netcdf(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str
     import h5netcdf
 
     try:
+        refuse_other(Path(path))
         stored = h5netcdf.File(path, "r")
     except (OSError, ValueError) as error:
         why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"
