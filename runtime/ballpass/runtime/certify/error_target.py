@@ -80,7 +80,8 @@ def checked_target(error: float) -> float:
     """A relative error within the bounds [1]; RequestError for another."""
     if not SMALLEST <= real(error) <= LARGEST:
         raise RequestError(
-            f"error: {error!r:.80} is not a relative error from {SMALLEST:g} to {LARGEST:g}. Example: 0.01 for 1 %."
+            f"{error!r:.80} is no error that can be asked for. Allowed: a relative error from {SMALLEST:g} "
+            f"to {LARGEST:g}. Example: 0.01 for 1 %."
         )
     return real(error)
 
