@@ -1,4 +1,4 @@
-"""Write the tables of options in docs/reference/cli.md from the declarations of the questions.
+"""Write the tables of options in docs/reference/cli.md from the declarations of the commands.
 
 ``python -m scripts.option_tables`` writes them anew; ``tests/test_cli_reference.py`` compares.
 """
@@ -12,19 +12,17 @@ from typing import Any
 import typer.main
 
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.app.commands.trade import trade
-from ballpass.runtime.questions import QUESTIONS
-from ballpass.runtime.questions.question import declared
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "cli.md"
 
 
 def with_tables(page: str) -> str:
-    """The page with the table of each question as its help has it."""
+    """The page with the table of each command that has options, as its help has it."""
     commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    for question in (*QUESTIONS, trade):
-        name = declared(question).name
-        rows = [_row(item) for item in commands[name].params if item.param_type_name == "option"]
+    for name, command in commands.items():
+        rows = [_row(item) for item in command.params if item.param_type_name == "option"]
+        if not rows:
+            continue
         table = "\n".join(["| option | meaning |", "| --- | --- |", *rows, ""])
         section = re.compile(
             rf"(## `ballpass {name} (?:(?!\n## ).)*?)\| option \| meaning \|\n(?:\|[^\n]*\n)+", re.DOTALL

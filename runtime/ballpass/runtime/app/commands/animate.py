@@ -33,16 +33,21 @@ def animate(
     format_: Annotated[
         str,
         Option(
-            words="`html`, a page that needs no network and no server; `mp4`; or `gif`.",
+            words="`html`, a page that needs no network and no server; `gif`; or `mp4`, which needs ffmpeg.",
             shown="KIND",
             flags=("--format",),
             choices=MOVING,
         ),
     ] = "html",
-    last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
+    last: Annotated[
+        float,
+        typer.Option(
+            metavar="N", help="Turns to show, the last ones of the run. Where nothing rotates, the whole run is shown."
+        ),
+    ] = 1.0,
     bearing: Shown = None,
     pictures: Annotated[
-        int | None, typer.Option(metavar="N", help="Pictures of a movie; 72 a turn if not given.")
+        int | None, typer.Option(metavar="N", help="Pictures of a movie, 12 a second; 72 a turn if not given.")
     ] = None,
     set_: options.Settings = None,
     cycles: Cycles = None,

@@ -34,7 +34,7 @@ def dataset(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="Zarr folder, or NetCDF file NAME.nc; results/<spec>.zarr if not given."),
+        typer.Option(metavar="PATH", help="Zarr folder, or NetCDF file NAME.nc; `results/<spec>.zarr` if not given."),
     ] = None,
     scheduler: options.Scheduler = None,
     workers: options.Workers = None,

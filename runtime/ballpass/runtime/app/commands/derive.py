@@ -15,7 +15,7 @@ from ballpass.runtime.contract.folder import read_manifest
 def derive(
     scene: options.SceneFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; `generated/<scene>` if not given.")
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; exit code 1 if the folder differs from a new derivation.")

@@ -42,11 +42,18 @@ def export(
     ] = False,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", metavar="NAME", help="A load, force, torque or speed that is an input; repeatable."),
+        typer.Option(
+            "--input",
+            metavar="NAME",
+            help="A load, force, torque or speed that is an input of the FMU, by its parameter name or the beginning "
+            "of it. May be repeated.",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="Folder or FMU to write; export/<scene>, export/<scene>.fmu if not given."),
+        typer.Option(
+            metavar="PATH", help="Folder or FMU to write; `export/<scene>`, `export/<scene>.fmu` if not given."
+        ),
     ] = None,
 ) -> None:
     """Write a scene as a program in C or as an FMU, which run without Python."""

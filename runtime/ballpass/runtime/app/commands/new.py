@@ -36,7 +36,9 @@ def new(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder to copy it to; made if it does not exist.")
     ] = Path(),
-    list_: Annotated[bool, typer.Option("--list", help="Print names and titles of all; so without NAME.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="Print names and titles of all scenes; so without NAME.")
+    ] = False,
 ) -> None:
     """Copy a scene or a data set that comes with ballpass into a folder. An existing file is not overwritten."""
     with command():

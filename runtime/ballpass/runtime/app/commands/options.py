@@ -75,7 +75,7 @@ FigureFormats = Annotated[
 
 Scheduler = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler: tcp://192.168.0.10:8786."),
+    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler: `tcp://192.168.0.10:8786`."),
 ]
 
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Run on N processes of a Dask cluster on this machine.")]

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 Of = Annotated[
     Sequence[str] | None,
     Option(
-        words="Quantity to report, and to which --error applies: peak_ball_force, drive_work. May be repeated.",
+        words="Quantity to report, and to which `--error` applies: `peak_ball_force`, `drive_work`. May be repeated.",
         shown="Q",
         names=option_names.quantities,
     ),
@@ -55,14 +55,18 @@ Of = Annotated[
 
 Method = Annotated[
     str | None,
-    Option(words=f"Integrator: auto, {', '.join(STEPPERS)}, cvodes.", shown="NAME", names=option_names.methods),
+    Option(
+        words=f"Integrator: {', '.join(f'`{name}`' for name in ('auto', *STEPPERS, 'cvodes'))}.",
+        shown="NAME",
+        names=option_names.methods,
+    ),
 ]
 
 AtKinks = Annotated[
     str | None,
     Option(
-        words="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or located, "
-        "so that its steps end there. Default: located at tight tolerances of auto and stepper.",
+        words="What the stepper does where a law has a kink or jump: `stepped-over`, left to error control, or "
+        "`located`, so that its steps end there. Default: `located` at tight tolerances of `auto` and `stepper`.",
         shown="CHOICE",
         names=option_names.kinks,
     ),
@@ -104,8 +108,8 @@ def run(
         str | None,
         typer.Option(
             metavar="START",
-            help="Where the run starts: equilibrium, the rings at rest under the load of t = 0, or the solution.nc of "
-            "another run, which continues. Default: as in the scene.",
+            help="`equilibrium`: the rings start at rest under the load of t = 0; or the solution.nc of another run, "
+            "which continues, and its transient counts from that one's start. Default: as in the scene.",
         ),
     ] = None,
     set_: options.Settings = None,
@@ -115,8 +119,8 @@ def run(
     error: Annotated[
         float | None,
         Option(
-            words="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
-            "the run is estimated.",
+            words="Relative error wanted, `1%` or `0.01`, instead of method and tolerance: both are chosen, and the "
+            "error of the run is estimated.",
             shown="E",
             reader=relative_error,
         ),

@@ -18,7 +18,9 @@ from ballpass.runtime.questions import option_names
 Of = Annotated[
     Sequence[str] | None,
     Option(
-        words="Output to keep, inner.ax; may be repeated. Default: all.", shown="OUTPUT", names=option_names.outputs
+        words="Output to keep, `inner.ax`. May be repeated. All of the scene if none is given.",
+        shown="OUTPUT",
+        names=option_names.outputs,
     ),
 ]
 

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 Of = Annotated[
     Sequence[str] | None,
     Option(
-        words="Quantity: peak_ball_force (or max:ball.force), rms:inner.y, range:inner.x, mean:, min:, end: ... May be "
-        "repeated. Peak ball force and motion of the inner ring if none is given.",
+        words="Quantity: `peak_ball_force` (or `max:ball.force`), `rms:inner.y`, `range:inner.x`, `mean:`, `min:` … "
+        "May be repeated. Peak ball force and motion of the inner ring if none is given.",
         shown="Q",
         names=option_names.quantities,
     ),
@@ -55,14 +55,14 @@ Of = Annotated[
 
 Method = Annotated[
     str | None,
-    Option(words="auto, or a stepper's name as in ballpass run.", shown="NAME", names=option_names.stepper_methods),
+    Option(words="`auto`, or a stepper's name as in `ballpass run`.", shown="NAME", names=option_names.stepper_methods),
 ]
 
 AtKinks = Annotated[
     str | None,
     Option(
-        words="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a time. "
-        "If not given, as in ballpass run: located at tight tolerances.",
+        words="What steps do where a law has a kink or jump: `stepped-over`, in lanes, or `located`, one member at a "
+        "time. If not given, as in `ballpass run`.",
         shown="CHOICE",
         names=option_names.kinks,
     ),
@@ -84,8 +84,9 @@ def sweep(
         list[str] | None,
         typer.Option(
             metavar="PATH=A:B:N",
-            help='N values of a number of the scene from A to B: --vary bearing.clearance="5 um:40 um:8". '
-            "With :log after N they are spaced by a factor. May be repeated: all combinations run.",
+            help='N values of a number of the scene from A to B: `--vary bearing.clearance="5 um:40 um:8"`. With '
+            "`:log` after N they are spaced by a factor; `bearing.clearance=CN:8` goes through a group of clearance. "
+            "May be repeated: all combinations run, the last one varying fastest.",
         ),
     ] = None,
     of: Of = None,
@@ -100,13 +101,18 @@ def sweep(
         bool | None,
         typer.Option(
             "--growth/--no-growth",
-            help="Run each member a second time from a start moved by the tolerance, and mark numbers without digits. "
-            f"If not given: up to {TWINS} members.",
+            help="Run each member a second time from a start moved by the tolerance, and mark numbers without digits: "
+            f"`~` in the table. If not given: up to {TWINS} members.",
             show_default=False,
         ),
     ] = None,
     threads: Annotated[
-        int | None, Option(words="Threads; as many as processors if not given.", shown="N", least=1)
+        int | None,
+        Option(
+            words="Threads; as many as processors if not given. The results are the same to the bit for any number.",
+            shown="N",
+            least=1,
+        ),
     ] = None,
     scheduler: options.Scheduler = None,
     workers: options.Workers = None,
