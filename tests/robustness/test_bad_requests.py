@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from functools import partial
@@ -13,6 +14,8 @@ import pytest
 from test_bad_input import EVIL, PRESS
 from typer.testing import CliRunner
 
+import ballpass.derive
+import ballpass.runtime
 from ballpass.derive import check, derive, equations, generate, lower, read_scene
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import (
@@ -27,6 +30,10 @@ from ballpass.runtime import (
     read_manifest,
 )
 from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.trade import trade
+from ballpass.runtime.contract.arguments import type_fault
+from ballpass.runtime.contract.options import options_of
+from ballpass.runtime.questions import QUESTIONS
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
@@ -63,6 +70,36 @@ def test_functions_of_both_packages_refuse_what_is_of_a_wrong_type(value: Any, t
     for call, wrong in calls.items():
         with pytest.raises(BallpassError):
             call(**wrong)
+
+
+def _public_functions() -> dict[str, Callable[..., Any]]:
+    """Questions, and public functions and methods of both packages, by name."""
+    found: dict[str, Callable[..., Any]] = {one.__name__: one for one in (*QUESTIONS, trade)}
+    for package in (ballpass.runtime, ballpass.derive):
+        for name in package.__all__:
+            item = getattr(package, name)
+            if inspect.isclass(item):
+                members = inspect.getmembers(item, inspect.isfunction)
+                found |= {f"{name}.{method}": one for method, one in members if not method.startswith("_")}
+            elif inspect.isfunction(item):
+                found[name] = item
+    return found
+
+
+def test_options_passed_as_their_defaults_are_accepted() -> None:
+    """`fit(signal=None)` was refused: types are checked by the words of annotations, and its alias was `Signals`."""
+    checked = 0
+    for name, function in _public_functions().items():
+        options = options_of(function)
+        for argument in inspect.signature(function).parameters.values():
+            if argument.default is not argument.empty:
+                fault = type_fault(argument.name, str(argument.annotation), argument.default)
+                if argument.name in options:
+                    kind, option = options[argument.name]
+                    fault = fault or option.fault(argument.name, kind, argument.default)
+                assert fault is None, f"{name}: {fault}"
+                checked += 1
+    assert checked > 200
 
 
 WRONG_VALUES = [
