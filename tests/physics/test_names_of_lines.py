@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.characteristic import characteristic_lines, names_of
+from ballpass.runtime.quantity.characteristic import CharacteristicLine, characteristic_lines, names_of
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.run.solution_file import load_solution
 
@@ -79,8 +80,27 @@ phase = "0 deg"
         nearest = np.argmin(np.abs(found.position[list(found.highest)] - frequency))
         assert found.names[nearest] == "load push"
         assert [mark.name for mark in model.spectrum("load.x").marks] == ["shaft", "load push"]
+        assert not [name for name in found.names if DAMAGED.search(name)], found.names
     turning = model.spectrum("load.x", parameters={"loads.push.frequency": 50.0})
     assert ([mark.name for mark in turning.marks], turning.names[0]) == (["shaft"], "shaft")
+
+
+def test_sidebands_of_a_load_at_a_bearings_frequency_are_given_with_those_of_the_bearing() -> None:
+    """The shaft modulates both: a record that cannot tell load and BPFI cannot tell their sidebands."""
+    shaft, inner = 50.0, 247.4
+    lines = (
+        CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name=""),
+        CharacteristicLine(name="load push", bearing="", frequency=inner + 0.1, side=shaft, side_name="shaft"),
+        CharacteristicLine(name="BPFI", bearing="", frequency=inner, side=shaft, side_name="shaft"),
+    )
+    for side in (-shaft, shaft):
+        first, *others = names_of(inner + side, lines, 0.5)
+        words = f"{'-' if side < 0.0 else '+'} shaft"
+        assert (first.words, [other.words for other in others]) == (f"load push {words}", [f"BPFI {words}"])
+    apart, *others = names_of(inner + shaft, lines, 0.05)
+    assert (apart.words, others) == ("BPFI + shaft", [])
+    damage, *_ = names_of(inner, (lines[0], replace(lines[1], frequency=inner - shaft), lines[2]), 0.5)
+    assert damage.words == "BPFI"  # the simpler name, though the load has a sideband there
 
 
 def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:

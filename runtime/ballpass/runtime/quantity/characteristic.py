@@ -56,7 +56,7 @@ class CharacteristicLine:
     name : "FTF", "BPFO", "BPFI" or "2 BSF"; "shaft", or a harmonic load of a frequency of its own, as "load push"
     bearing : name of the bearing, "" for the scene's only one and for the machine
     frequency : [Hz], or [1] as an order
-    side : distance of its sidebands, in the same unit; 0 for the machine and the cage, which have none
+    side : distance of its sidebands, in the same unit; 0 for shaft and cage, which have none
     side_name : what that is, "shaft" or "FTF"
     parts : into which its lines divide it: an engine whose loads repeat after two turns has lines of half a shaft
     """
@@ -128,7 +128,7 @@ def characteristic_lines(
         order = frequency / shaft * parts
         if abs(order - round(order)) < LOCKED:
             continue
-        found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=0.0, side_name=""))
+        found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=shaft, side_name="shaft"))
     for bearing in manifest.bearings:
         one = frequencies_of(bearing, values)
         cage, turning = one.cage / unit, one.shaft / unit
@@ -184,7 +184,7 @@ class LineName:
     rank : how far from simple the words are
     beside : distance from the line of the spectrum, in lines of the spectrum [1]
     of_machine : whether it is the shaft or a load alone
-    of_load : whether it is of balls that pass the load, as those of a healthy bearing do
+    healthy : whether a healthy bearing has it: balls that pass the load, or sidebands of a harmonic load
     """
 
     words: str
@@ -192,15 +192,15 @@ class LineName:
     rank: int
     beside: float
     of_machine: bool
-    of_load: bool
+    healthy: bool
 
 
 def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> tuple[LineName, ...]:
     """What a line of a spectrum is, then as simple names that the record cannot tell from it; empty for nothing.
 
     The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
-    name of a bearing from a multiple of the shaft or of a load, that wins.  So does a simpler name of balls that pass
-    the load, as those of a healthy bearing do, against one of damage.
+    name of a bearing from a multiple of the shaft or of a load, that wins.  So does a name of balls that pass the load,
+    or of a load with sidebands, as a healthy bearing has them, against one of damage that is not simpler.
 
     Parameters
     ----------
@@ -223,15 +223,15 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
                         frequency=found,
                         rank=math.ceil(k) + 3 * abs(m),
                         beside=beside,
-                        of_machine=not line.of_bearing,
-                        of_load=line.name == "BPFO",
+                        of_machine=m == 0 and not line.of_bearing,
+                        healthy=line.name == "BPFO" or not line.of_bearing,
                     )
                 )
     if not fits:
         return ()
     fits.sort(key=lambda name: (not name.of_machine, name.beside + COMPLICATED * name.rank, name.words))
-    healthy = [name for name in fits if name.of_load and name.rank < fits[0].rank and not fits[0].of_machine]
-    first = healthy[0] if healthy and not fits[0].of_load else fits[0]
+    healthy = [name for name in fits if name.healthy and name.rank <= fits[0].rank]
+    first = healthy[0] if healthy and not fits[0].healthy else fits[0]
     others = [name for name in fits if name is not first]
     simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
     near = [name for name in others if not name.of_machine and name.rank <= simple]
