@@ -11,7 +11,7 @@ from typing import Literal
 
 import sympy as sp
 
-from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.drive.drive import Drive, OverAngle, part_of, parts_of_knots
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, symbol_of
 from ballpass.derive.variables import DRIVER_ANGLE, Input, phase
@@ -43,22 +43,14 @@ class ConstantSpeed(Drive):
 
         A table over several turns is one over the angle divided by these: that repeats after a turn.
         """
-        divided: list[Definition] = []
-
-        def part(path: str, place: str, unit: str, words: str) -> str:
-            """Name of a number divided by the turns."""
-            if turns == 1:
-                return path
-            symbol = sp.Symbol(f"{name}.{place}", real=True)
-            latex = rf"\mathrm{{{place.replace('_', ' ')}}}_{{\mathrm{{{name}}}}}"
-            words = f"{words} of the table of {name}, over its {turns} turns"
-            expression = sp.Symbol(path, real=True) / turns
-            divided.append(Definition(symbol=symbol, expression=expression, unit=unit, description=words, latex=latex))
-            return str(symbol)
-
-        offset = part(self.phase.offset, "part_angle", "rad", "Start angle")
-        rate = part(self.phase.rate, "part_speed", "rad/s", "Speed")
-        angles = [part(path, f"part_angle_{k}", "rad", f"Angle {k}") for k, path in enumerate(angles, start=1)]
+        offset, rate, divided = self.phase.offset, self.phase.rate, list(parts_of_knots(name, angles, turns))
+        if turns > 1:
+            divided = [
+                part_of(name, "part_angle", "rad", "Start angle", offset, turns),
+                part_of(name, "part_speed", "rad/s", "Speed", rate, turns),
+                *divided,
+            ]
+            offset, rate, *angles = (str(one.symbol) for one in divided)
 
         def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
             return Input(
