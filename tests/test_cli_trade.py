@@ -108,7 +108,7 @@ def test_a_named_error_tells_choice_estimate_and_cost(ballpass: Callable[..., Re
     ("arguments", "words"),
     [
         (["--error", "soon"], "is not a relative error"),
-        (["--error", "-1%"], "is not a relative error"),
+        (["--error", "-1%"], "no error that can be asked for"),
         (["--error", "1%", "--rtol", "1e-6"], "or the error"),
         (["--error", "1%", "--of", "peak_ball_farce"], "peak_ball_force"),
     ],

@@ -72,7 +72,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
     runs = []
     for parts in ([whole], cut(whole, cuts)):
         x = members.initial.copy()
-        rows = driver.rows.empty(count, span.starts, ("inner.y", "ball.force"))
+        rows = driver.rows.empty(count, span.starts, driver.rows.all_of(("inner.y", "ball.force")))
         carried = driver.carry(count)
         reached = np.zeros(count)
         for part in parts:
