@@ -129,6 +129,17 @@ def test_tables_of_speed_that_say_nothing_are_refused(keys: str, words: str) -> 
         scene_from_text(PRESS.replace(SPEED, keys + "\n"), "press")
 
 
+@pytest.mark.parametrize("first", ["0 rpm", "0.5 rpm"])
+def test_a_run_without_a_length_lasts_until_the_last_row(tmp_path: Path, first: str) -> None:
+    """Sixty turns at the first speed were two hours; from rest there were no turns."""
+    keys = f'table = {{ time = ["0 s", "0.8 s"], speed = ["{first}", "300 rpm"] }}\n'
+    text = PRESS[: PRESS.index("[bearing]")].replace(SPEED, keys)
+    model = load(generate(scene_from_text(f'{text}\n[run]\noutputs = ["driver.*"]\n', "press"), tmp_path / "model"))
+    run = model.simulate()
+    assert run.t[[0, -1]] == pytest.approx([0.0, 0.8])
+    assert run["driver.speed"][-1] == pytest.approx(10.0 * math.pi)
+
+
 def test_a_run_begins_at_the_start_of_its_table(press: Model) -> None:
     with pytest.raises(RequestError, match="its table has"):
         press.simulate(duration=0.1, initial=[0.0, 10.0])

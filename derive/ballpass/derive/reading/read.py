@@ -253,7 +253,9 @@ def _read(root: Table, name: str) -> Scene:
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads)
-        run, outputs = _read_run(root.table("run", required=False), cycle * math.ceil(STEADY_CYCLES / cycle))
+        speeds = mechanism.driver.table if mechanism is not None else None
+        span = speeds.time[-1].value if speeds is not None and speeds.time else None
+        run, outputs = _read_run(root.table("run", required=False), cycle * math.ceil(STEADY_CYCLES / cycle), span)
         given = root.data.get("run")
         turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
         transient = "transient_cycles" in turns
@@ -293,13 +295,18 @@ def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Seq
     return math.lcm(1, *counts)
 
 
-def _read_run(table: Table, steady: int) -> tuple[RunSettings, tuple[str, ...]]:
-    """Length, samples and method of a run, and the names of its outputs; without a length `steady` turns count."""
+def _read_run(table: Table, steady: int, span: float | None) -> tuple[RunSettings, tuple[str, ...]]:
+    """Length, samples and method of a run, and the names of its outputs.
+
+    Without a length it takes the `span` of the driver's table of speeds [s], or else `steady` turns count.
+    """
     if table.missing:  # not a fault
         table = Table(table.collector, table.path, {})
     with table:
         run = read_record(RunSettings, table)
-        if run.cycles is None and run.duration is None:
+        if run.cycles is None and run.duration is None and span is not None:
+            run = replace(run, duration=span)
+        elif run.cycles is None and run.duration is None:
             dropped = run.transient_cycles if "transient_cycles" in table.data else DROPPED_CYCLES
             run = replace(run, cycles=dropped + steady, transient_cycles=dropped)
         return run, read_keys(table, {"outputs": OUTPUTS})["outputs"]
