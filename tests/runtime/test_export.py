@@ -593,6 +593,8 @@ def test_exported_folder_knows_no_machine_and_repeats_byte_for_byte(
     written = {path.name for path in again.iterdir()}
     assert {"Makefile", "README.md", "main.c", "ballpass.c", "ballpass.h", "scene.c", "constants.c"} <= written
     assert {"kernels.h", "method_tables.h", "stepper.c"} <= written
+    named = re.findall(r"`(\w+\.[ch])`", (again / "README.md").read_text(encoding="utf-8"))
+    assert set(named) <= written
 
 
 # command line
