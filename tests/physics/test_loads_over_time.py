@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.app.transient_words import warnings_of_transient
+from ballpass.runtime.questions.life import COLUMNS, life_figures
 
 #: The rotor's scene gives 60 turns, 1.2 s, here without the first five; most of it is heavily loaded.
 TRANSIENT, HEAVY, LENGTH = 0.1, 1.0, 1.2
@@ -35,6 +37,19 @@ def test_life_is_that_of_the_load_in_the_scenes_turns(worked: Model) -> None:
     heavy = (HEAVY - TRANSIENT) / (LENGTH - TRANSIENT)
     for reading, turns in alone.lives.items():
         assert found.hours(found.lives[reading]) == pytest.approx(alone.hours(turns) / heavy, rel=0.02)
+
+
+@pytest.mark.long
+def test_the_pressure_of_a_life_is_drawn_over_the_whole_run(worked: Model) -> None:
+    """It was over the first turn after the transient, which of a load over time is any."""
+    figure = dict(life_figures(worked, worked.life(), {}))["pressure"]
+    panel = figure.axes[0]
+    assert panel.get_xlabel() == "time [s]"
+    column = (LENGTH - TRANSIENT) / COLUMNS
+    assert panel.get_xlim() == pytest.approx([TRANSIENT, LENGTH], abs=column)
+    pressure = np.max(panel.collections[0].get_array(), axis=0)
+    times = np.linspace(TRANSIENT, LENGTH, len(pressure))
+    assert np.min(pressure[times < HEAVY]) > 2.0 * np.max(pressure[times > 1.05])
 
 
 def test_no_answer_takes_turns_behind_the_table(worked: Model) -> None:

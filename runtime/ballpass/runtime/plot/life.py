@@ -56,32 +56,36 @@ def damage(title: str, bearing: BearingStrength) -> Figure:
 
 
 @styled
-def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, ring: str, turns: int) -> Figure:
-    """Peak pressure of every ball's contact over a turn, or over several of an engine's cycle.
+def pressure(title: str, bearing: BearingStrength, across: Array, found: Array, ring: str, turns: int | None) -> Figure:
+    """Peak pressure of every ball's contact over a turn, over several of an engine's cycle, or over a run.
 
     Parameters
     ----------
-    crank : angles of driver or shaft, increasing over the turns, shape (samples,) [rad]
+    across : angles of driver or shaft, increasing over the turns [rad], or times [s], shape (samples,)
     found : shape (samples, balls) [Pa]
+    turns : None over a run
     """
     figure = new_figure(4.4)
     panel = figure.add_subplot()
     balls, element = found.shape[1], RATED[bearing.element]
-    edges = np.degrees(np.append(crank, 2.0 * crank[-1] - crank[-2]))
+    edges = np.append(across, 2.0 * across[-1] - across[-2])
+    edges = edges if turns is None else np.degrees(edges)
     mesh = panel.pcolormesh(
         edges, np.arange(balls + 1) + 0.5, found.T / 1e6, cmap=LUMINANCE.reversed(), rasterized=True
     )
     figure.colorbar(mesh, ax=panel, label="peak pressure [MPa]")
-    panel.set(xlabel="angle of driver or shaft [°]", ylabel=element.noun, yticks=range(1, balls + 1))
+    xlabel = "time [s]" if turns is None else "angle of driver or shaft [°]"
+    panel.set(xlabel=xlabel, ylabel=element.noun, yticks=range(1, balls + 1))
     panel.grid(visible=False)
-    name = "turn" if turns == 1 else f"{turns} turns"
+    name = "the run" if turns is None else "a turn" if turns == 1 else f"{turns} turns"
+    shown = name if turns is None else f"the first {name.removeprefix('a ')} after the transient"
     words = (
-        f"Peak pressure between each {element.noun} and the {ring} ring in the first {name} after the transient; dark "
+        f"Peak pressure between each {element.noun} and the {ring} ring in {shown}; dark "
         f"is high. The static limit of ISO 76 is {element.static_pressure / 1e6:.0f} MPa; the highest pressure of all "
         f"turns is {bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and "
         f"{bearing.outer.peak_pressure / 1e6:.0f} MPa at the outer ring."
     )
-    caption(figure, f"{_titled(title, bearing)}: pressure over {'a turn' if turns == 1 else name}", words)
+    caption(figure, f"{_titled(title, bearing)}: pressure over {name}", words)
     return figure
 
 

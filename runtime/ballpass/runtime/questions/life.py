@@ -30,6 +30,9 @@ StepperMethod = Annotated[
 #: Clearances of the figure of life, and steady turns of each.
 POINTS, TURNS = 17, 64
 
+#: Columns at most of the pressure over a run, each the highest of some samples.
+COLUMNS = 2000
+
 
 def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, float]) -> Iterator[tuple[str, Figure]]:
     """Figures of every bearing in the first state of the duty cycle in which something turns."""
@@ -104,22 +107,31 @@ def life(
 def _pressure(
     model: AnyModel, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
 ) -> Figure:
-    """The ring with the higher pressure, over a turn after the transient; an engine's over the turns of its cycle."""
+    """The ring with the higher pressure, over a turn after the transient; an engine's over the turns of its cycle.
+
+    Over the whole run where its turns are unlike each other.
+    """
     from ballpass.runtime.ask.wear import load_samples
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of
     from ballpass.runtime.run.driver_angle import cycle_turns
     from ballpass.runtime.run.request import Request
     from ballpass.runtime.run.resolve import resolve
+    from ballpass.runtime.run.settle import repeats
 
     numbers = model.numbers(overrides)
-    turns = cycle_turns(numbers.values)
-    run = resolve(model, numbers, Request(cycles=model.run_settings.transient_cycles + turns))
+    whole = resolve(model, numbers, Request())
+    turns = cycle_turns(numbers.values) if repeats(model, numbers.values, whole.start) else None
+    cycles = None if turns is None else model.run_settings.transient_cycles + turns
+    run = resolve(model, numbers, Request(cycles=cycles))
     samples = load_samples(run)[info.prefix]
     inner, outer = contacts_of(info, numbers.values)
     ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
-    crank = np.unwrap(samples.crank) + 2.0 * np.pi * (model.run_settings.transient_cycles % turns)
     found = contact.peak_pressure(samples.force)
+    if turns is None:
+        begins = np.arange(0, len(found), -(-len(found) // COLUMNS))
+        return figures.pressure(title, bearing, samples.time[begins], np.maximum.reduceat(found, begins), ring, None)
+    crank = np.unwrap(samples.crank) + 2.0 * np.pi * (model.run_settings.transient_cycles % turns)
     return figures.pressure(title, bearing, crank, found, ring, turns)
 
 
