@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ import pytest
 from ball_effects import taken
 from comparison import drawn, power_imbalance
 from coupled_scenes import (
+    CHANGING_SLIP,
     EFFECTS,
     LAGGING,
     LAGGING_LONG,
@@ -32,7 +33,7 @@ from virtual import virtual_model
 
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, load
+from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum
 from ballpass.runtime.ask.vibration import order_spectrum
 
@@ -163,6 +164,16 @@ def test_a_slip_that_changes_is_the_same_as_a_state_and_known_before_the_run(tmp
         found = model.sensitivities(names, duration=0.12, method="stepper-dop853", rtol=1e-11).x[-1]
         columns.append(found[[model.states.index(name) for name in known.states]])
     assert columns[1] == pytest.approx(columns[0], rel=1e-6, abs=1e-6 * np.max(np.abs(columns[0])))
+
+
+@pytest.mark.long
+def test_points_of_a_lag_that_is_a_state_are_refused(tmp_path: Path) -> None:
+    """Its integral grows without end, also behind the last row: a section is on no curve."""
+    model = built(press(bearing("A", effects=CHANGING_SLIP)), tmp_path / "model")
+    asked = (model.steady, model.section, partial(model.bifurcation, "bearings.at_A.clearance=8 um:9 um:2"))
+    for question in asked:
+        with pytest.raises(RequestError, match="slip of a cage changes over time"):
+            question()
 
 
 #: With preload, so that every ball strikes the edges.

@@ -62,11 +62,16 @@ class ForcingPeriod:
 
 
 def refuse_free_driver(manifest: Manifest, question: str) -> None:
-    """Refuse a scene without states, and one whose driver's motion is a state: its period is not known."""
+    """Refuse a scene without states, and one where the driver's motion or a cage's lag is a state: no period."""
     if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
         why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
         raise RequestError(
             f"{question}: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed."
+        )
+    if any(coordinate.kind == "lag" for coordinate in manifest.coordinates):
+        raise RequestError(
+            f"{question}: the slip of a cage changes over time in this scene, and its lag is a state that no turn "
+            "brings back. Allowed: a constant slip."
         )
 
 
