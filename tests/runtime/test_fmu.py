@@ -762,10 +762,8 @@ def test_a_driver_at_constant_speed_takes_its_speed_as_an_input(
             assert one.get("der(driver.speed)")[0] == pytest.approx((speed + 10.0 - model.parameters[SPEED]) / 0.1)
     slip = '[bearing.cage]\nslip = { time = ["0 s", "0.5 s"], value = [0.0, 0.04] }\n\n[bearing.damping]'
     Path("press.toml").write_text(scene_text("punching_press", ("[bearing.damping]", slip)), encoding="utf-8")
-    refused = CliRunner().invoke(app, command)
-    assert refused.exit_code == 2
-    assert "input 'mechanism.driver.speed': with a speed that changes" in refused.stderr
-    assert "slip" in refused.stderr
+    assert CliRunner().invoke(app, command).exit_code == 0  # the lag of its cage is a state then
+    assert validate_fmu("export/press.fmu") == []
 
 
 @pytest.mark.long

@@ -243,17 +243,16 @@ function warningsOf({ known, rows, deflections }) {
     return odd && scale > 0 ? [filled(words, [...values, of === null ? total : values[0] / scale])] : [];
   });
   solver.bearings.forEach((bearing, k) => {
-    const { limits, cosine, gap } = bearing, ball = known[bearing.ball], half = known[bearing.clearance] / 2;
+    const { limits } = bearing, ball = known[bearing.ball], half = known[bearing.clearance] / 2;
     const words = (limit, deflection, displaced) => filled(limits[limit], { deflection: 1e3 * deflection, displaced: 1e3 * displaced, share: 100 * deflection / ball });
     const check = (deflection, displaced) => {
       const limit = deflection > solver.limits.flattened * ball ? "flattened" : displaced > ball ? "displaced" : "";
       if (limit) throw new Error(`${solver.limits.void}\n${words(limit, deflection, displaced)}`);
     };
-    check(deflections[k], deflections[k] + half); // of every step
+    const deflection = deflections[k]; // of every step
+    check(deflection, deflection + half);
     let displaced = 0; // of the samples, as the summary of a run has it
     for (const row of rows) displaced = Math.max(displaced, 1e-6 * length(motionOf(bearing, row)));
-    const deflection = (cosine === null ? 1 : known[cosine]) * (displaced - (gap === null ? half : known[gap]));
-    check(deflection, displaced);
     if (deflection > solver.limits.deflected * ball) said.push(words("deflected", deflection, displaced));
   });
   return said;

@@ -17,7 +17,7 @@ from ballpass.runtime.run.magnitudes import mass_matrix
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ballpass.runtime.contract.manifest import CoordinateInfo, Manifest
+    from ballpass.runtime.contract.manifest import BearingInfo, Manifest
     from ballpass.runtime.contract.parameters import Numbers
     from ballpass.runtime.native.loaded_model import LoadedModel
 
@@ -69,7 +69,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
     for bearing, turned in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
         angles = turned % driver_angle.TURN
-        x, y = (_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, state) for axis in "xy")
+        x, y = (_apart(bearing, axis, at, state) for axis in "xy")
         apart = x * np.cos(angles) + y * np.sin(angles) - radial_gap(bearing, values)
         deflections = contact_cosine(bearing, values) * apart  # Eq. (6)
         ball = int(np.argmax(deflections))
@@ -119,14 +119,12 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
 def ring_distances(manifest: Manifest, x: np.ndarray) -> np.ndarray:
     """Distances of the rings of each bearing [m], at states of shape (states, .): shape (bearings, .)."""
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
-    found = [
-        np.hypot(*(_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, x) for axis in "xy"))
-        for bearing in manifest.bearings
-    ]
+    found = [np.hypot(*(_apart(bearing, axis, at, x) for axis in "xy")) for bearing in manifest.bearings]
     return np.array(found).reshape(len(found), *x.shape[1:])
 
 
-def _relative(coordinate: CoordinateInfo, at: Mapping[str, int], state: np.ndarray) -> np.ndarray:
-    """A coordinate, less its partner's where it has one."""
-    value = state[at[coordinate.name]]
-    return np.asarray(value - state[at[coordinate.partner]] if coordinate.partner else value)
+def _apart(bearing: BearingInfo, axis: str, at: Mapping[str, int], x: np.ndarray) -> np.ndarray:
+    """Position of the inner ring relative to the outer one along an axis [m], at states of shape (states, .)."""
+    outer = at.get(f"{bearing.prefix}outer.{axis}")
+    inner = x[at[bearing.inner_state(axis)]]
+    return np.asarray(inner if outer is None else inner - x[outer])
