@@ -68,7 +68,11 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/howto/bifurcation.md": {
         "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",
         "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of ask/lyapunov.py",
-        "repeat after n, up to 16.": "`LONGEST` of ask/lyapunov.py",
+        "repeat after n, up to 200,": "`LONGEST` of ask/lyapunov.py",
+        "at 10 µm with 3/8 −9.893456 ± 3e-7": "ADR 0032; test_bifurcation.py",
+        "exact over 134 readings, and 268 give": "test_bifurcation.py",
+        "at 40 µm 38 readings read 4.0 to 4.4": "ADR 0032",
+        "fewer than 268 readings say `quasi-periodic`, more `periodic 134`": "test_bifurcation.py",
         "ratio 409/1072) repeats after 134 turns only": "(1 - 7.9375/33.5)/2; test_steady.py",
         "In Fig. 7 of the paper": "the paper's figure",
         "clearance of 40 µm the paper's press is chaotic: +4.2 a turn": "ADR 0032",

@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import t as student
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, period_of
+from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, largest_exponent, period_of, strobe_with_tangents
 
 THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 RPM = math.tau / 60.0
@@ -21,14 +21,12 @@ RPM = math.tau / 60.0
 
 @pytest.mark.long
 def test_the_exponent_of_a_periodic_motion_is_the_logarithm_of_its_largest_multiplier(rotor: Model) -> None:
-    found = rotor.bifurcation("shaft.speed=380 rpm:393.1540342298 rpm:2", readings=120, settling=20)
-    multiplier = abs(rotor.steady().multipliers[0])
+    found = rotor.bifurcation("shaft.speed=380 rpm:393.1540342298 rpm:2", settling=40)
     motion = found.up[-1]
     assert motion.kind == "periodic 1"
     assert motion.exponent is not None
-    assert motion.exponent.mean == pytest.approx(
-        math.log(multiplier), abs=3e-3
-    )  # the tangent turns on within 60 readings
+    assert motion.exponent.mean == pytest.approx(math.log(0.778800783), abs=1e-8)  # exp(-c T/2m)
+    assert motion.exponent.half < 1e-8  # a pair of complex multipliers: the tangent turns on from reading to reading
 
 
 def test_between_the_doublings_readings_take_two_values(rotor: Model) -> None:
@@ -74,6 +72,54 @@ def test_the_exponent_of_the_papers_press_is_that_of_the_multiplier_of_134_turns
     assert motion.exponent.mean == pytest.approx(-1.7588, abs=2e-3)  # at 1e-7 it is -1.7506
     assert motion.kind == "quasi-periodic"
     assert "balls or loads are elsewhere" in found.every
+
+
+@pytest.mark.long
+def test_intervals_of_fifty_runs_that_contract_are_as_wide_as_their_scatter(make_model: Callable[..., Model]) -> None:
+    press, draw = make_model("punching_press_tangent"), np.random.default_rng(10)
+    given = {**THREE_EIGHTHS, "bearing.clearance": 10e-6}
+    numbers, step = press.numbers(given), press.period(given)
+    names, found = list(press.manifest.initial), []
+    assert [name.rpartition("initial.")[2] for name in names[:4]] == ["inner.x", "inner.y", "outer.x", "outer.y"]
+    for _ in range(50):
+        start = np.array([numbers.values[name] for name in names])
+        start[:4] += 5e-6 * draw.normal(size=4)
+        run = press.simulate(
+            duration=10 * step, parameters=given, initial=start, outputs=[], transient=0.0, progress=False
+        )
+        magnitude = np.array(run.statistics.magnitudes)
+        states, flows = strobe_with_tangents(press, numbers, run.end, step, 20, magnitude, 1e-10, lambda: None)
+        found.append(largest_exponent(flows, states, magnitude))
+    mean, scatter = (function([one.mean for one in found]) for function in (np.mean, np.std))
+    assert mean == pytest.approx(math.log(abs(press.steady(parameters=given).multipliers[0])), abs=1e-4)
+    assert sum(one.low < mean < one.high for one in found) / 50 >= 0.90
+    assert np.mean([one.half for one in found]) < 1.5 * 1.96 * scatter
+
+
+@pytest.mark.long
+def test_the_papers_press_repeats_after_134_turns_where_readings_are_twice_as_many(
+    make_model: Callable[..., Model],
+) -> None:
+    found = make_model("punching_press_tangent").bifurcation(
+        "bearing.clearance=19.9 um:20 um:2", readings=268, settling=20
+    )
+    motion = found.down[0]
+    assert motion.kind == "periodic 134"
+    assert motion.exponent is not None
+    assert motion.exponent.mean == pytest.approx(-1.7588, abs=2e-3)
+    assert motion.exponent.half < 0.02
+
+
+def test_multipliers_of_a_motion_that_repeats_give_its_exponent_whichever_way_the_tangent_turns() -> None:
+    turn = 1.1
+    flow = 0.7 * np.array([[math.cos(turn), -4.0 * math.sin(turn)], [0.25 * math.sin(turn), math.cos(turn)]])
+    flows = np.array([np.diag([1e-90, 1e-90]) @ flow, np.diag([1e90, 1e90]) @ flow] * 31)
+    flows, states = flows[:-2], np.array([[1.0, 2.0], [2.0, 1.0]] * 30)[:55]
+    found = largest_exponent(flows, states, np.ones(2))
+    assert found.mean == pytest.approx(math.log(0.7), rel=1e-9, abs=0.0)
+    assert found.half < 1e-9
+    steady = largest_exponent(np.array([flow] * 60), np.zeros((55, 2)), np.ones(2))
+    assert steady.mean == pytest.approx(math.log(0.7), rel=1e-12, abs=0.0)
 
 
 def test_the_interval_of_batch_means_holds_the_mean_of_a_correlated_series_as_often_as_it_says() -> None:

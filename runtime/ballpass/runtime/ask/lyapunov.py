@@ -1,9 +1,10 @@
-"""Largest Lyapunov exponent by tangents, with an interval from batch means; what kind of motion it speaks for.
+"""Largest Lyapunov exponent by tangents, with an interval; what kind of motion it speaks for.
 
 In: a model, numbers, a state, a time between readings.  Out: `Exponent`, stroboscopic states.
 
 A tangent is carried along and made of length one again after every reading, so that nothing overflows in a motion that
-repels and nothing sinks into rounding in one that attracts.
+repels and nothing sinks into rounding in one that attracts.  Where readings repeat, each period gives the exponent by
+its multipliers instead: a tangent that turns, or that grows elsewhere than it shrinks, grows unevenly for ever.
 """
 
 from __future__ import annotations
@@ -26,11 +27,14 @@ ALIGN = 5
 #: Batches of readings, whose means are taken for independent, and confidence of the interval.
 BATCHES, CONFIDENCE = 10, 0.95
 
-#: Longest period that is recognized, in readings.
-LONGEST = 16
+#: Longest period that is recognized, in readings: the paper's press repeats after 134 turns.
+LONGEST = 200
 
 #: Readings that repeat, in shares of the magnitudes [1].
 REPEATED = 1e-4
+
+#: Smallest growth of which there is a logarithm [1].
+TINY = float(np.finfo(float).tiny)
 
 #: Half an interval about zero that is short enough to say that nothing grows, per reading [1].
 NARROW = 0.02
@@ -58,6 +62,41 @@ class Exponent:
         return self.mean + self.half
 
 
+def largest_exponent(
+    flows: np.ndarray, states: np.ndarray, magnitude: np.ndarray, drifts: Collection[float] = ()
+) -> Exponent:
+    """Exponent of a motion from what `strobe_with_tangents` gives: by multipliers where it repeats, else by growth.
+
+    Parameters
+    ----------
+    drifts : as for `exponent_of`
+    """
+    if period := period_of(states, magnitude):
+        ends = range(len(flows), ALIGN, -period)
+        return _interval(
+            np.array([_largest_multiplier(flows[end - period : end]) / period for end in ends if end - period >= ALIGN])
+        )
+    direction = np.ones(len(magnitude)) / np.sqrt(len(magnitude))
+    growth = []
+    for flow in flows:
+        grown = flow @ direction
+        size = float(np.linalg.norm(grown))
+        # a disturbance below the smallest number has no direction: any one will do
+        direction = grown / size if size > 0.0 else direction
+        growth.append(np.log(max(size, TINY)))
+    return exponent_of(np.array(growth[ALIGN:]), drifts)
+
+
+def _largest_multiplier(flows: np.ndarray) -> float:
+    """Logarithm of the largest eigenvalue of a product, whose factors follow each other in time."""
+    product, logarithm = np.eye(flows.shape[1]), 0.0
+    for flow in flows:
+        product = flow @ product
+        size = max(float(np.linalg.norm(product)), TINY)
+        product, logarithm = product / size, logarithm + np.log(size)
+    return float(logarithm + np.log(max(float(np.max(np.abs(np.linalg.eigvals(product)))), TINY)))
+
+
 def exponent_of(growth: np.ndarray, drifts: Collection[float] = ()) -> Exponent:
     """Mean of the growth at each reading, and its interval by batch means: readings in a row are not independent.
 
@@ -75,12 +114,17 @@ def exponent_of(growth: np.ndarray, drifts: Collection[float] = ()) -> Exponent:
     mean, *heights = np.linalg.lstsq(waves, growth)[0]
     left = growth - waves[:, 1:] @ np.array(heights)
     batches = np.array([batch.mean() for batch in np.array_split(left, BATCHES)])
-    spread = batches.std(ddof=1) / np.sqrt(1.0 - len(heights) / len(growth))
-    half = student.ppf(0.5 + CONFIDENCE / 2.0, BATCHES - 1) * spread / np.sqrt(BATCHES)
+    half = _interval(batches).half / np.sqrt(1.0 - len(heights) / len(growth))
     return Exponent(mean=float(mean), half=float(half))
 
 
-def strobe_with_tangent(
+def _interval(parts: np.ndarray) -> Exponent:
+    """Mean of independent parts of one length, and its interval by Student."""
+    half = student.ppf(0.5 + CONFIDENCE / 2.0, len(parts) - 1) * parts.std(ddof=1) / np.sqrt(len(parts))
+    return Exponent(mean=float(parts.mean()), half=float(half))
+
+
+def strobe_with_tangents(
     model: LoadedModel,
     numbers: Numbers,
     begin: RunEnd,
@@ -90,7 +134,8 @@ def strobe_with_tangent(
     rtol: float,
     each: Callable[[], None],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States after each time step, shape (readings, states), and growth of a disturbance in each, shape (readings,).
+    """States after each time step, shape (readings, states), and by those before, in shares of the magnitudes, shape
+    (ALIGN + readings, states, states): a tangent turns into the direction that grows most in the first of these.
 
     Parameters
     ----------
@@ -102,20 +147,14 @@ def strobe_with_tangent(
         A run failed.
     """
     names = list(model.manifest.initial)
-    direction = np.ones(len(names)) / np.sqrt(len(names))
-    states, growth = np.empty((readings, len(names))), np.empty(readings)
-    for k in range(-ALIGN, readings):
+    states, flows = np.empty((ALIGN + readings, len(names))), np.empty((ALIGN + readings, len(names), len(names)))
+    for k in range(ALIGN + readings):
         each()
         request = Request(duration=step, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol)
         found = sensitivities(model, numbers, request, names)
-        grown = (found.x[-1] @ (direction * magnitude)) / magnitude
-        size = float(np.linalg.norm(grown))
-        # a disturbance below the smallest number has no direction: any one will do
-        direction = grown / size if size > 0.0 else direction
+        states[k], flows[k] = found.solution.x[-1], found.x[-1] * magnitude / magnitude[:, None]
         begin = found.solution.end
-        if k >= 0:
-            states[k], growth[k] = found.solution.x[-1], np.log(max(size, np.finfo(float).tiny))
-    return states, growth
+    return states[ALIGN:], flows
 
 
 def period_of(states: np.ndarray, magnitude: np.ndarray) -> int:

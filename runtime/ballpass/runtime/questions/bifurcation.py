@@ -226,7 +226,7 @@ def bifurcation(
     """
     from ballpass.runtime.ask.forcing_period import refuse_changing, refuse_free_driver
     from ballpass.runtime.ask.kept_parts import kept_parts
-    from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion
+    from ballpass.runtime.ask.lyapunov import kind_of_motion, largest_exponent
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.run.locating import refuse_jumps
 
@@ -259,12 +259,12 @@ def bifurcation(
                 step = step_of(given)
                 values = model.numbers(given).values
                 refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
-                states, growth, magnitude = parts.once(
+                states, flows, magnitude = parts.once(
                     np.array([value, *([] if start is None else start)]),
                     partial(_motion, model, given, step, start, readings, settling, rtol, exponent, each),
                 )
                 drifts = () if drifts_of is None else drifts_of(given)
-                grown = exponent_of(growth, drifts) if exponent else None
+                grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
                 kind = kind_of_motion(states, magnitude, grown, forced=drifts_of is None)
                 found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind))
                 start = states[-1]
@@ -342,8 +342,8 @@ def _motion(
     exponent: bool,
     each: Callable[[], None],
 ) -> Arrays:
-    """The motion from a state on: readings, growth at each, which is empty without an exponent, and magnitudes."""
-    from ballpass.runtime.ask.lyapunov import strobe_with_tangent
+    """The motion from a state on: readings, their derivatives by those before, if any, and magnitudes."""
+    from ballpass.runtime.ask.lyapunov import strobe_with_tangents
 
     count = max(settling, 1) if exponent else settling + readings
     run = model.simulate(
@@ -361,6 +361,6 @@ def _motion(
         return run.x[settling:], np.zeros(0), magnitude
     tight = EXPONENT_RTOL if rtol is None else rtol
     return (
-        *strobe_with_tangent(model, model.numbers(parameters), run.end, step, readings, magnitude, tight, each),
+        *strobe_with_tangents(model, model.numbers(parameters), run.end, step, readings, magnitude, tight, each),
         magnitude,
     )
