@@ -27,6 +27,11 @@ from ballpass.runtime import (
     SimulationError,
     UnknownValueWarning,
 )
+from ballpass.runtime.certify import derivative_runs
+from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate
+from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.run.request import Request
 
 CLEARANCE, MASS, ANGLE = "bearing.clearance", "mechanism.bodies.slider.mass", "mechanism.driver.start_angle"
 SPEED = "mechanism.driver.speed"
@@ -195,6 +200,33 @@ def test_derivatives_that_mean_nothing_are_refused(
     monkeypatch.setattr(smooth, "manifest", jumping)
     with pytest.raises(RequestError, match="discontinuous"):
         function.jacobian(function.start)
+
+
+def test_most_motions_show_without_another_run_that_they_are_not_chaotic(
+    smooth: Model, press: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The derivative along the start says what differences of moved starts say; only a large one needs these runs."""
+    quantities, request = quantities_of(smooth, ["end:inner.y"]), Request(cycles=0.02, transient_cycles=0.0, rtol=1e-11)
+    run, _ = derivative_run(smooth, smooth.numbers(None), request)
+    found, _ = differentiate(QuantityRun(smooth, quantities), run, [CLEARANCE], 1e-11)
+    moved = np.concatenate([run.magnitude[: len(run.magnitude) // 2], np.zeros(len(run.magnitude) // 2)])
+    ends = [
+        QuantityRun(smooth, quantities).measure(replace(run, initial=run.initial + step * moved)).end
+        for step in (1e-5, -1e-5)
+    ]
+    assert ends[0] is not None
+    assert ends[1] is not None
+    change = np.max(np.abs(ends[0] - ends[1]) / 2e-5 / run.magnitude)
+    assert found.growth == pytest.approx(change, rel=1e-4)
+    looks: list[str] = []
+    monkeypatch.setattr(derivative_runs, "refuse_growth", lambda *_: looks.append("moved start"))
+    calm = QuantityFunction(smooth, OF, CLEARANCE, **SPAN)
+    calm.jacobian(calm.start)
+    assert not looks
+    wild = QuantityFunction(press, "range:inner.x", MASS, cycles=4, transient=0, parameters={CLEARANCE: 120e-6})
+    with pytest.warns(KinkWarning):
+        wild.jacobian(wild.start)
+    assert looks == ["moved start"]
 
 
 @pytest.mark.parametrize(

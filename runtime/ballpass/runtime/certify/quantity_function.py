@@ -20,7 +20,7 @@ from typing import Any, Literal, NoReturn, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
+from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, differentiate_unless_chaotic
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 from ballpass.runtime.contract.arguments import typed_methods
@@ -63,7 +63,7 @@ class QuantityFunction:
     kinks : treatment of the kinks of the laws in runs for values.  By default steps go over them, in lanes; ``located``
         gives the same bits as `Model.quantities` with the same options
     failed : for a value or derivative that is not known: ``raise`` an error, or give ``nan`` with a warning
-    chaos : ``refuse`` derivatives of a chaotic motion (this check takes two more runs each), or ``ignore`` chaos
+    chaos : ``refuse`` derivatives of a chaotic motion, or ``ignore`` chaos
 
     Attributes
     ----------
@@ -392,14 +392,15 @@ class QuantityFunction:
         """A run of its own."""
         numbers = self._numbers(row)
         quantities = [self._quantities[k] for k in of]
-        if self._chaos == "refuse":
-            refuse_chaos(self._model, numbers, quantities, self._request)
         try:
             along = self._free[of].pop()
         except IndexError:
             along = QuantityRun(self._model, quantities)
         run, _ = derivative_run(self._model, numbers, replace(self._request, rtol=self._slope_rtol))
-        found, _ = differentiate(along, run, self.wrt, self._slope_rtol)
+        if self._chaos == "refuse":
+            found, _ = differentiate_unless_chaotic(along, run, self._request, self.wrt, self._slope_rtol)
+        else:
+            found, _ = differentiate(along, run, self.wrt, self._slope_rtol)
         self._free[of].append(along)
         return found.estimates
 

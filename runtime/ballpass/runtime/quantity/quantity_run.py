@@ -70,6 +70,8 @@ class EvaluatedQuantities:
     track : states along nodes of the whole run; None where there are none
     row : reductions, None where nothing was run
     end : state at the end of the run, shape (states,); None likewise
+    growth : with derivatives, how far a change of the start by the motion's magnitudes changes the states at the nodes
+        and at the end, in these [1]
     seconds : of the plain integration alone [s]
     steps, rejected : of the integration
     """
@@ -78,6 +80,7 @@ class EvaluatedQuantities:
     track: Track | None = None
     row: Array | None = None
     end: Array | None = None
+    growth: float = 0.0
     seconds: float = 0.0
     steps: int = 0
     rejected: int = 0
@@ -175,6 +178,7 @@ class QuantityRun:
             edges = self._moving_edges(run, layout, chain, sensitivity_rtol)
             laid += [_Differentiated(run, part, edges, chain) for part in _by_nodes(layout)]
         slopes: dict[str, Estimate] = {}
+        growth = 0.0
         for still in (False, True):
             some = [one for one in laid if one.layout.still is still]
             if not some:
@@ -182,6 +186,7 @@ class QuantityRun:
             segments, nodes = some[0].layout.segments, joined_nodes([one.nodes for one in some])
             # in one run for all
             track = follow(run, segments, some[0].edges, nodes, chain, sensitivity_rtol, still=still)
+            growth = max(growth, track.growth)
             first = 0
             for one in some:
                 count = len(one.nodes)
@@ -203,7 +208,7 @@ class QuantityRun:
                 estimates.append(replace(slopes[item.name], value=plain.value, time=plain.time, ball=plain.ball))
             else:
                 estimates.append(self._at_rest(item, run, chain))
-        return replace(found, estimates=tuple(estimates))
+        return replace(found, estimates=tuple(estimates), growth=growth)
 
     def _measure(
         self, run: Run, noded: Sequence[Quantity], directions: int = 0

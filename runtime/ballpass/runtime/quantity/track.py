@@ -56,6 +56,8 @@ class Track:
     local : time since the segment's start, shape (nodes,) [s]
     u : inputs, shape (nodes, inputs)
     segments : of the driver
+    growth : how far a change of the start by the motion's magnitudes changes the states, in these; without derivatives
+        it is not known [1]
     """
 
     nodes: Nodes
@@ -65,6 +67,7 @@ class Track:
     local: Array
     u: Array
     segments: Segments
+    growth: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,13 +120,13 @@ def follow(
     if kept is not None:
         x = stepper_for(model, run.kinks).read(kept, times)[back]
         return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments)
-    made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks)
+    made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks, run.magnitude)
     if made is not None and sensitivity_rtol is not None:
         made.control(sensitivity_rtol, run.magnitude)
     near = time_resolution(run.begin, run.end, run.turn)
     samples = Samples(times=times, x=np.empty((len(times), count)), near=near, end=run.end, directions=made)
     start_run(run, [samples]).go_on()
-    states = samples.x
+    states, growth = samples.x, 0.0
     if made is not None:
         # the driver gives the derivative before the edge
         before = np.clip(np.searchsorted(segments.times, times, side="left") - 1, 0, None)
@@ -136,7 +139,9 @@ def follow(
         }
         rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
         slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
-    return Track(nodes=nodes, edges=edges, x=states[back], slope=slope, local=local, u=u, segments=segments)
+        growth = made.growth()
+    x = states[back]
+    return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments, growth=growth)
 
 
 def part_of_track(track: Track, first: int, last: int) -> Track:

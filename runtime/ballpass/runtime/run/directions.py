@@ -127,6 +127,8 @@ class Directions:
     names : parameters
     samples : number of samples of the run
     kinks : treatment of the kinks of the laws
+    magnitude : of the states, shape (states,): follow one direction more, whose start is moved by the magnitudes of the
+        positions, for `growth`.  It has no part in the choice of step sizes, and fills a lane that is free, if any
 
     Raises
     ------
@@ -135,12 +137,19 @@ class Directions:
     """
 
     def __init__(
-        self, model: LoadedModel, numbers: Numbers, names: Sequence[str], samples: int, kinks: Kinks = STEPPED_OVER
+        self,
+        model: LoadedModel,
+        numbers: Numbers,
+        names: Sequence[str],
+        samples: int,
+        kinks: Kinks = STEPPED_OVER,
+        magnitude: np.ndarray | None = None,
     ) -> None:
         self.chain = Chain(model, numbers, names)
         self.names = self.chain.names
         count, lanes = len(names), stepper_for(model, kinks, derivatives=True).lanes
-        self._lanes, self._blocks, self._count = lanes, -(-count // lanes), count
+        self._magnitude = magnitude
+        self._lanes, self._blocks, self._count = lanes, -(-(count + (magnitude is not None)) // lanes), count
         self._check_memory(
             f"{samples} samples of derivatives of {len(model.states)} states by {count} parameters, as the driver "
             "writes them and as they are handed out, of",
@@ -148,6 +157,9 @@ class Directions:
             2 * len(model.states),
         )
         self._x = self._blocked(self.chain.initial)
+        if magnitude is not None:
+            half = len(magnitude) // 2
+            self._x[-1, :half, count % lanes] = magnitude[:half]
         self._height = max(len(model.manifest.inputs), 1)
         self.samples = np.zeros((samples, self._blocks, len(model.states), lanes))
         self._scales = partial(direction_scales, model.manifest, numbers.values, self.names)
@@ -224,6 +236,13 @@ class Directions:
             weight=self._weight,
             rtol=self._rtol,
         )
+
+    def growth(self) -> float:
+        """Largest change of the states by the moved start, at samples and at the run's end, in the magnitudes [1]."""
+        assert self._magnitude is not None
+        lane = self._count % self._lanes
+        followed = np.vstack([self.samples[:, -1, :, lane], self._x[-1, :, lane]])
+        return float(np.max(np.abs(followed) / self._magnitude))
 
     def states(self, finished: int) -> np.ndarray:
         """Derivatives of the states at the samples, shape (finished, states, parameters)."""
