@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +19,9 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.designations import bearing_types
 from ballpass.runtime import Model, load
 from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.point.slopes import KinkWarning
+from ballpass.runtime.quantity.grammar import parse_quantity, quantity_words
 from ballpass.runtime.ratings.elements import RATED, ElementGeometry
 from ballpass.runtime.ratings.elements.cylindrical_roller import dynamic_factor
 from ballpass.runtime.ratings.of_bearing import contacts_of, ratings_of
@@ -377,6 +381,32 @@ def test_sensitivities_of_the_press_whose_rollers_meet_and_part_are_verified(mak
     wrt = ["bearing.clearance", "bearing.contact.length"]
     report = model.sensitivity(["peak_ball_force", "mean:inner.y"], wrt)
     assert all(pair.check.verdict is Verdict.VERIFIED for pair in report.pairs)
+    assert report.grazing
+    assert not BALL.search(str(report))
+
+
+#: The word, not in the name of an output or a key.
+BALL = re.compile(r"(?<![\w.])[Bb]alls?\b(?!\.\w)")
+
+
+def test_no_word_of_a_scene_of_rollers_is_a_ball(make_virtual: Callable[..., Model]) -> None:
+    """Descriptions, equations, reports and refusals say "roller"; names of keys and outputs keep "ball"."""
+    model = make_virtual("varying_compliance", *ROLLER, ('law = "none"', 'law = "one-sided"\ncoefficient = "50 N*s/m"'))
+    manifest = model.manifest
+    infos = (*manifest.parameters, *manifest.constants, *manifest.states, *manifest.outputs)
+    texts = [info.description for info in infos]
+    texts.append((model.folder / "EQUATIONS.md").read_text(encoding="utf-8"))
+    texts.append(quantity_words(manifest, parse_quantity(manifest, "peak_ball:ball.force")))
+    rest = model.static_equilibrium()
+    texts += [repr(rest), str(rest)]
+    with pytest.warns(KinkWarning, match="roller") as warned:
+        model.linearize()
+    texts += [str(one.message) for one in warned]
+    with pytest.raises(RequestError) as refused:
+        parse_quantity(manifest, "max:ball.force[99]")
+    texts.append(str(refused.value))
+    found = [text for text in texts if BALL.search(text)]
+    assert not found, found
 
 
 @pytest.mark.long

@@ -244,8 +244,8 @@ def test_explain_says_of_each_bearing_what_is_not_modelled(
     told = "\n".join(json.loads(done.stdout)["not_modelled"])
     assert "bearings.right.outer_ring" in told
     assert "bearings.left.outer_ring" not in told
-    for name in ("left", "right"):
-        assert f"waviness of the outer raceway (bearings.{name}.outer_waviness)" in told
+    assert told.count("waviness of the outer raceway") == 1
+    assert "waviness of the outer raceway (bearings.NAME.outer_waviness; NAME: left, right)" in told
 
 
 def test_bearings_on_a_shaft_carry_their_shares_of_its_load(

@@ -82,5 +82,5 @@ def _of_balls(bearing: BearingModel) -> Iterator[Event]:
     for switch in ball.switching.switches:
         symbol = ball.deflection_rate if switch.of_rate else ball.deflection
         rate = None if switch.of_rate or ball.damping_force is None else ball.deflection_rate
-        changes = "the force of the ball jumps" if switch.jumps else "the force of the ball has a kink"
+        changes = bearing.names.words(f"the force of the ball {'jumps' if switch.jumps else 'has a kink'}")
         yield Event(name=symbol.name, kind="state", function=switch.function, rate=rate, changes=changes)

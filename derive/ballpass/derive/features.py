@@ -19,6 +19,7 @@ from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
 from ballpass.derive.system import derive
+from ballpass.runtime.ratings.elements import element_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,7 +231,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
         yield Feature(
             name=f"{effect.kind}{of}",
             path=f"{bearing.path}.{effect.kind}",
-            modelled=EFFECTS[effect.kind].describe(effect),
+            modelled=element_words(EFFECTS[effect.kind].describe(effect), [bearing.element]),
             without=_with(scene, replace(bearing, effects=rest)),
         )
 

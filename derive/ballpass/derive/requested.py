@@ -157,7 +157,7 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
             expression=count
             * (slope * sp.diff(deflection, one) * sp.diff(deflection, other) + force * sp.diff(deflection, one, other)),
             unit="N/m",
-            description=f"Entry {axes} of the stiffness matrix of all balls{of}",
+            description=names.words(f"Entry {axes} of the stiffness matrix of all balls") + of,
             balls_of=names.prefix,
             over_balls=True,
         )
@@ -168,7 +168,7 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
             name=f"{names.prefix}ball.stiffness",
             expression=slope,
             unit="N/m",
-            description=f"Slope of the elastic force of each ball{of} by its deflection",
+            description=names.words("Slope of the elastic force of each ball") + f"{of} by its deflection",
             per_ball=True,
             balls_of=names.prefix,
         )
@@ -246,7 +246,7 @@ def bearing_power_outputs(
     if load is None and ball.ring_rate is not None:
         power += count * sum(total.symbol for total in ball.sums[2:]) * ball.ring_rate
     rows.append(("cage.moment", count * moment, "N*m", f"Moment of the rings on the cage{of}, counter-clockwise"))
-    rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
+    rows.append(("contact.power", power, "W", names.words("Power of all ball forces") + of))
     if load is not None:
         rows.append(("load.power", dot(load, speed), "W", f"Power of the load on the inner ring{of}"))
         masses = [(names.constant("m_ei"), speed)]
@@ -265,7 +265,7 @@ def bearing_power_outputs(
                 name=f"{names.prefix}ball.loss",
                 expression=taken,
                 unit="W",
-                description=f"Power loss by the damping force of each ball{of}",
+                description=names.words("Power loss by the damping force of each ball") + of,
                 per_ball=True,
                 balls_of=names.prefix,
             )
@@ -275,7 +275,7 @@ def bearing_power_outputs(
                 name=f"{names.prefix}contact.loss",
                 expression=count * taken,
                 unit="W",
-                description=f"Power loss by the damping forces of all balls{of}",
+                description=names.words("Power loss by the damping forces of all balls") + of,
                 balls_of=names.prefix,
                 over_balls=True,
             )

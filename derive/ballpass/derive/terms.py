@@ -12,7 +12,9 @@ from enum import Enum
 
 import sympy as sp
 
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber, Vector
+from ballpass.runtime.ratings.elements import element_words
 
 #: Time since the reference time of the phases [s] (see `System.inputs`).
 TIME = sp.Symbol("t", real=True)
@@ -47,6 +49,7 @@ class Names:
 
     prefix: str
     path: str
+    element: str = "ball"
 
     def variable(self, name: str) -> sp.Symbol:
         """Symbol of a variable."""
@@ -60,11 +63,19 @@ class Names:
         """A description, marked with the part's name where there are several."""
         return text if not self.prefix else rf"{{{text}}}^{{(\mathrm{{{self.prefix[:-1]}}})}}"
 
+    def words(self, text: str) -> str:
+        """A description of a bearing, with what its rolling elements are called."""
+        return element_words(text, [self.element])
+
     def define(self, symbol: sp.Symbol, expression: sp.Expr, unit: str, description: str, latex: str) -> Definition:
         """``symbol := expression``."""
-        return Definition(
-            symbol=symbol, expression=expression, unit=unit, description=description, latex=self.latex(latex)
-        )
+        words, latex = self.words(description), self.latex(latex)
+        return Definition(symbol=symbol, expression=expression, unit=unit, description=words, latex=latex)
+
+
+def names_of(bearing: Bearing) -> Names:
+    """Names of a bearing's symbols."""
+    return Names(prefix=bearing.prefix, path=bearing.path, element=bearing.element)
 
 
 def symbol_of(quantity: SceneNumber) -> sp.Symbol:

@@ -18,7 +18,7 @@ from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Driver
-from ballpass.derive.terms import TIME, Definition, Names, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
 from ballpass.derive.variables import Coordinate, Input, StateSwitch, phase
 
 
@@ -64,7 +64,7 @@ def cage_ratio(names: Names) -> sp.Symbol:
 
 def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False) -> Cage:
     """A ring at constant speed [rad/s], the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
-    names = Names(prefix=bearing.prefix, path=bearing.path)
+    names = names_of(bearing)
     turning, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
     pass_speed, passing = names.constant(f"{turning}_pass_speed"), _phase(bearing, names, turning)
@@ -79,7 +79,7 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False
     behind, ledger, rate = sp.S.Zero, Ledger(), speed
     if lag is not None:
         behind, constants = lag.angle, (*constants, *lag.constants)
-        words = "speed of the balls about the bearing's axis"
+        words = names.words("speed of the balls about the bearing's axis")
         rate = ledger.define(f"{bearing.prefix}cage.rate", speed - lag.rate, "rad/s", words, names.latex(r"\dot\psi"))
     angle = even.symbol + speed * TIME - behind
     over_turning = passing.symbol + pass_speed * TIME - behind
@@ -174,7 +174,7 @@ def cage_between(
     bodies, swings : of the bodies that carry inner and outer ring
     driver, drive : the driver of the scene, and how it moves; where a torque drives, constant speeds are initial ones
     """
-    names = Names(prefix=bearing.prefix, path=bearing.path)
+    names = names_of(bearing)
     ledger = Ledger()
     driver_speed, start = symbol_of(driver.speed), symbol_of(driver.start_angle)
     speed, share = names.constant("cage_speed"), cage_ratio(names)
@@ -205,7 +205,7 @@ def cage_between(
         f"{bearing.prefix}cage.rate",
         sum((w * body.rate for w, body in zip((share_now, 1 - share_now), bodies, strict=True)), start=sp.S.Zero),
         "rad/s",
-        "speed of the balls about the bearing's axis",
+        names.words("speed of the balls about the bearing's axis"),
         names.latex(r"\dot\psi"),
     )
     words = "Mean speed of the balls about the bearing's axis"
@@ -322,7 +322,7 @@ def _phase(bearing: Bearing, names: Names, ring: str = "") -> Input:
     seen = f", as the {ring} ring sees it" if ring else ""
     return phase(
         f"{bearing.prefix}{f'{ring}_pass' if ring else 'cage'}",
-        f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time{seen}",
+        names.words(f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time{seen}"),
         names.latex(rf"\psi_{{0,{ring[0]}}}" if ring else r"\psi_0"),
         offset=bearing.ball_angle.path,
         rate=f"{bearing.path}.{f'{ring}_pass' if ring else 'cage'}_speed",

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.derive.terms import Definition, names_of, symbol_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +37,7 @@ def contact_cosine(bearing: Bearing) -> sp.Expr:
     """Cosine of the contact angle: a constant that `contact_direction` defines, or 1."""
     if bearing.contact_angle is None and bearing.axial_displacement is None:
         return sp.S.One
-    return Names(prefix=bearing.prefix, path=bearing.path).constant("cos_contact_angle")
+    return names_of(bearing).constant("cos_contact_angle")
 
 
 def ball_turns(bearing: Bearing) -> sp.Expr:
@@ -47,7 +47,7 @@ def ball_turns(bearing: Bearing) -> sp.Expr:
 
 def contact_direction(bearing: Bearing) -> ContactDirection:
     """The direction of the contacts of a bearing."""
-    names, cosine = Names(prefix=bearing.prefix, path=bearing.path), contact_cosine(bearing)
+    names, cosine = names_of(bearing), contact_cosine(bearing)
     half = symbol_of(bearing.clearance) / 2
     if cosine == 1:
         return ContactDirection(cosine=cosine, gap=half)

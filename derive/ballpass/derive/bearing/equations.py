@@ -23,7 +23,7 @@ from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import TIME, Definition, Names, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
@@ -101,7 +101,7 @@ class RingMotion:
 
 def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     """Contact of the balls; `cage` says how they turn."""
-    names = Names(prefix=bearing.prefix, path=bearing.path)
+    names = names_of(bearing)
     stiffness = names.constant("k_b")
     direction = contact_direction(bearing)
     constants = [*direction.constants, *ELEMENTS[bearing.element].stiffness(bearing, names), *cage.constants]
@@ -109,8 +109,7 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     numbers = {q.path.rpartition(".")[2]: symbol_of(q) for q in bearing.damping.numbers}
     coefficient = law.coefficient(numbers, stiffness)
     if coefficient != 0:
-        words = law.words.replace("a ball", f"a {ELEMENTS[bearing.element].noun}")
-        constants.append(names.define(names.constant("c_b"), coefficient, law.unit, words, law.latex))
+        constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
     coordinates = ring_coordinates(bearing)
     ball, parts = _ball(bearing, names, coordinates, cage)
     return BearingModel(
@@ -131,7 +130,7 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
 
     The inner ring of a bearing beside another one has the coordinates of that.
     """
-    own = Names(prefix=bearing.prefix, path=bearing.path)
+    own = names_of(bearing)
     first = Names(prefix=f"{bearing.beside}.", path=f"bearings.{bearing.beside}") if bearing.beside else own
     rings = [("inner", "inner ring", "i", first)] + ([("outer", "outer ring", "o", own)] if bearing.outer else [])
     of = f" of {bearing.name}" if bearing.name else ""

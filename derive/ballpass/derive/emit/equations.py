@@ -126,10 +126,10 @@ def _contact(tex: _Printer, model: BearingModel) -> list[str]:
     angle = model.names.latex(r"\theta_j")
     return [
         f"## Contact{f' of {name}' if name else ''}",
-        rf"Ball $j = 1 \dots {ball.count}$ at the angle",
+        model.names.words(rf"Ball $j = 1 \dots {ball.count}$ at the angle"),
         _equation(rf"{angle} = \frac{{2\pi (j - 1)}}{{{ball.count}}} + {tex(ball.cage_angle)}"),
         *_definitions(tex, ball.definitions),
-        "Sums over the balls:",
+        model.names.words("Sums over the balls:"),
         *(_line(tex, s, rf"\sum_{{j=1}}^{{{ball.count}}} {tex(s.expression)}") for s in ball.sums),
     ]
 

@@ -46,7 +46,7 @@ from ballpass.derive.scene.shipped import shipped_scenes
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
-from ballpass.derive.terms import Names
+from ballpass.derive.terms import Names, names_of
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.folders import read_file
 
@@ -325,7 +325,7 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
                 remedy="give the bearing another name",
             )
         bearing = read_bearing(table, mechanism, driven, name)
-        bearings.append(_marked(bearing, Names(prefix=bearing.prefix, path=bearing.path)))
+        bearings.append(_marked(bearing, names_of(bearing)))
     _check_couplings(root, bearings)
     return tuple(_beside(root, bearing, bearings[:k]) for k, bearing in enumerate(bearings))
 
@@ -380,7 +380,10 @@ def _one_or_several(root: Table, one: str, example: str) -> Iterator[tuple[Table
 
 def _marked(record: T, names: Names) -> T:
     """A part with its name in its symbols, where several have the same ones."""
-    marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(record)}
+    marked = {
+        q.path: replace(q, description=names.words(q.description), latex=names.latex(q.latex))
+        for q in quantities_of(record)
+    }
     return cast(T, replaced(record, marked))
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ballpass.runtime.app.summary_words import row_place, row_words, written
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import parse_quantity, quantity_words
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import ReportTable
 
@@ -127,7 +128,8 @@ def render_quantities(manifest: Manifest, found: Mapping[str, QuantityValue]) ->
     for name, one in found.items():
         factor, unit = table_unit(one.unit)
         time = "" if one.time is None else f"t = {one.time:.6g} s"
-        ball = "" if one.ball is None else f"ball {one.ball}"
+        channel = parse_quantity(manifest, name).channel
+        ball = "" if one.ball is None else bearing_words(f"ball {one.ball}", manifest.bearings, channel)
         rows.append((name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
     heads, caption = ("quantity", "value", "unit", "at"), _quantities_words(manifest, found)
     return ReportTable(title="Quantities", heads=heads, rows=rows, right=("value",), caption=caption)

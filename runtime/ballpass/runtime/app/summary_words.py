@@ -14,7 +14,7 @@ from typing import Any
 
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.ratings.elements import RatedElement
-from ballpass.runtime.ratings.of_bearing import contacts_of, rated_element
+from ballpass.runtime.ratings.of_bearing import bearing_words, contacts_of, rated_element
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.short_words import short_words
 from ballpass.runtime.run.driver_angle import crank_angle
@@ -50,8 +50,7 @@ def row_words(manifest: Manifest, name: str) -> str:
     prefix, own = _of_bearing(manifest, name)
     whose = f" of {prefix.removesuffix('.')}" if prefix else ""
     if own in _ADDED:
-        noun = next((rated_element(one).noun for one in manifest.bearings if one.prefix == prefix), "ball")
-        words = _ADDED[own].replace("ball", noun).replace("Ball", noun.capitalize())
+        words = bearing_words(_ADDED[own], manifest.bearings, name)
         return f"{words}{',' + whose.removeprefix(' of') if whose else ''}"
     infos = (*manifest.states, *manifest.outputs)
     found = next((info.description for info in infos if info.name == name), "")

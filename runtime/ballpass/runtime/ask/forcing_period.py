@@ -22,6 +22,7 @@ from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
 
@@ -126,6 +127,7 @@ def forcing_period(
         words = "; ".join(
             _turned(name, count * (near[name] * order / n if name in near else 1), n) for name, n in rates.items()
         )
+        words = bearing_words(words, model.manifest.bearings)
         found = _checked(
             model, numbers, times, states, ForcingPeriod(rate=base, count=count, words=words, difference=0.0)
         )

@@ -256,6 +256,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             "steps": course.steps,
             "parameters": {name: numbers.parameters[name] for name in names},
         },
+        elements=tuple(bearing.element for bearing in manifest.bearings),
     )
 
 

@@ -16,6 +16,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.quantity.values import QuantityValue
+from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
 
@@ -93,6 +94,7 @@ class SensitivityReport(Reported):
     pairs : quantity by quantity, parameters in order
     grazing : where the trajectory grazes a kink
     settings : cycles, transient, method, tolerances, steps
+    elements : kinds of the bearings' rolling elements
 
     Examples
     --------
@@ -111,6 +113,7 @@ class SensitivityReport(Reported):
     pairs: tuple[Sensitivity, ...]
     grazing: tuple[Grazing, ...]
     settings: Mapping[str, Any]
+    elements: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """One line."""
@@ -248,7 +251,7 @@ def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
         what = "quantity" if quantity.value == 0.0 else "parameter"
         rows += [(Marked(f"{what} is 0: no % per %", "head"),), *_rows(zero, judged=judged)]
     return ReportTable(
-        title=_title(quantity, report.words.get(quantity.name, "")),
+        title=_title(quantity, report.words.get(quantity.name, ""), element_words("ball", report.elements)),
         heads=("parameter", "% per %", "derivative", *(["verdict"] if judged else [])),
         rows=rows,
         right=("% per %",),
@@ -279,12 +282,12 @@ def _bounded(pair: Sensitivity) -> bool:
     return pair.check.bounded and not pair.is_nothing
 
 
-def _title(quantity: QuantityValue, described: str) -> str:
+def _title(quantity: QuantityValue, described: str, noun: str) -> str:
     words = f"{described}\n{quantity.name} = {quantity.value:.6g} {printed_unit(quantity.unit)}".lstrip()
     if quantity.time is not None:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:
-        words += f", ball {quantity.ball}"
+        words += f", {noun} {quantity.ball}"
     return words
 
 
@@ -349,11 +352,11 @@ def _remarks(report: SensitivityReport) -> list[Words]:
         places = merge_grazing(report.grazing)
         count = f"{len(places)} place{'s' if len(places) > 1 else ''}"
         if len(places) < len(report.grazing):
-            count += f" ({len(report.grazing)} counting each ball)"
+            count += f" ({len(report.grazing)} counting each {element_words('ball', report.elements)})"
         more = f"; the first {LISTED} here, --json lists all" if len(places) > LISTED else ""
         words = f" at {count}: a small change moves the motion over a kink there{more}"
         lines.append(Marked("grazing", "doubt", words))
-        lines += [f"  {describe(items)}" for items in places[:LISTED]]
+        lines += [f"  {element_words(describe(items), report.elements)}" for items in places[:LISTED]]
     return lines
 
 

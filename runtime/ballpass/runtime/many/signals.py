@@ -25,6 +25,7 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
 from ballpass.runtime.quantity.passages import entering_times
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
@@ -261,8 +262,8 @@ def check_outputs(manifest: Manifest, signals: Signals, label: str, model: Loade
             faults.append(f"class {label}: {no_output(manifest, name, tuple(infos), 'output')}")
         elif infos[name].size != 1:
             faults.append(
-                f"class {label}: {name} has a value for each ball, and a signal has one. Allowed: outputs with one "
-                "value, such as inner.ax or reaction.A.x."
+                f"class {label}: {name} has a value for each {bearing_words('ball', manifest.bearings, name)}, and a "
+                "signal has one. Allowed: outputs with one value, such as inner.ax or reaction.A.x."
             )
     try:
         if model is None:

@@ -16,7 +16,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.animate import animation_page, write_animation
-from ballpass.runtime.ratings.of_bearing import rated_element
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
@@ -88,8 +88,7 @@ class SolutionPlot:
             for name in chosen:
                 lines = axes.plot(steady.t, factor * steady[name], linewidth=1.0)
                 count = len(lines)
-                owners = (one for one in steady.manifest.bearings if name.startswith(f"{one.prefix}ball."))
-                noun = next((rated_element(one).noun for one in owners), "ball")
+                noun = bearing_words("ball", steady.manifest.bearings, name)
                 for number, line in enumerate(lines, start=1):
                     line.set_label(name if count == 1 else f"{name}, {noun} {number}")
             axes.set_xlabel("time [s]")

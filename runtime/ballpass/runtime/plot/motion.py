@@ -192,7 +192,7 @@ def spectra(record: Record) -> Figure:
         axes.set_xlim(0.0, limit)
     crank = "crank" if record.manifest.mechanism is not None else "shaft"
     if closer:
-        _draw_closer(panels[2], lines, shaft, ball_pass, crank, floor)
+        _draw_closer(panels[2], lines, shaft, ball_pass, (record.noun, crank), floor)
     for axes in panels:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # not by mathtext, which is slow
@@ -211,7 +211,7 @@ def spectra(record: Record) -> Figure:
     if shaft > 0.0:
         words = f"{crank} harmonics, {shaft:.4g} Hz", f"{record.noun} pass (BPFO) and multiples, {ball_pass:.4g} Hz"
         legend_above(figure, [Line2D([], [], **look | {"linewidth": 1.4}) for look in (_HARMONICS, _BALL_PASS)], words)
-        text += _unresolved(ball_pass, shaft, spectrum.resolution, crank)
+        text += _unresolved(ball_pass, shaft, spectrum.resolution, (record.noun, crank))
     title = record.title("Displacement spectra")
     frame(figure, title, f"{text} {source.settings()}.", hspace=0.45 if closer else 0.25)
     return figure
@@ -225,7 +225,12 @@ def _mark(axes: Axes, limit: float, shaft: float, ball_pass: float) -> None:
 
 
 def _draw_closer(
-    axes: Axes, lines: dict[str, AmplitudeSpectrum], shaft: float, ball_pass: float, crank: str, floor: float
+    axes: Axes,
+    lines: dict[str, AmplitudeSpectrum],
+    shaft: float,
+    ball_pass: float,
+    words: tuple[str, str],
+    floor: float,
 ) -> None:
     """Ball pass and the nearest harmonic, x thin and dark over y, wide and light."""
     order = round(ball_pass / shaft)
@@ -238,7 +243,8 @@ def _draw_closer(
         tops = np.maximum(spectrum.amplitude[shown], floor)
         axes.plot(spectrum.frequency[shown], tops, label=axis, zorder=3 if axis == "x" else 2, **look)
     axes.set_xlim(low, high)
-    axes.set_title(f"c) ball pass beside harmonic {order} of the {crank}: x thin and dark, y wide and light")
+    noun, crank = words
+    axes.set_title(f"c) {noun} pass beside harmonic {order} of the {crank}: x thin and dark, y wide and light")
 
 
 def _apart(ball_pass: float, shaft: float) -> float:
@@ -260,13 +266,16 @@ def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
     return min(max(wanted, end / 50.0), end)
 
 
-def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -> str:
+def _unresolved(ball_pass: float, shaft: float, resolution: float, words: tuple[str, str]) -> str:
     """A warning where the record is too short to separate ball pass from its nearest crank harmonic."""
     order, distance = max(round(ball_pass / shaft), 1), _apart(ball_pass, shaft)
     if distance >= resolution:
         return ""
     needed = f"; separating them takes {int(np.ceil(shaft / distance))} turns" if distance > 1e-6 * shaft else ""
-    return f" Ball pass and {crank} harmonic {order} are {distance:.3g} Hz apart, within one line{needed}."
+    noun, crank = words
+    return (
+        f" {noun.capitalize()} pass and {crank} harmonic {order} are {distance:.3g} Hz apart, within one line{needed}."
+    )
 
 
 @styled

@@ -122,7 +122,7 @@ def _draw(
     part = slice(shown[0], shown[-1] + 1)
     if record.can_draw_bearing:
         axes.plot(across[part], record.highest_ball_force()[part], color=INK, linewidth=1.1)
-        axes.set_ylabel("highest\nball force [N]")
+        axes.set_ylabel(f"highest\n{record.noun} force [N]")
     elif record.has("drive_torque"):
         axes.plot(across[part], record.values("drive_torque")[part], color=INK, linewidth=1.1)
         axes.set_ylabel("drive\ntorque [N·m]")

@@ -59,7 +59,7 @@ def draw_section(
     section.locator_params("x", nbins=5)
     section.set_xlabel(label(names[place], shown[place]))
     section.set_ylabel(label(names[rate], shown[rate]))
-    over.set_xlabel(label("place of the balls", around))
+    over.set_xlabel(label("place of the rolling elements", around))
     over.set_ylabel(label(names[place], shown[place]))
     figure.legend(*section.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption(figure, "Poincaré section", words)

@@ -26,6 +26,7 @@ from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, JacobianDirections, Rows, contract, directions_of, rows_of
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -102,8 +103,12 @@ class StaticEquilibrium(Reported):
         places = ", ".join(f"{name} {q:.4g} m" for name, q in self._found.items())
         return (
             f"StaticEquilibrium({self.model.manifest.scene} at t = {self.time:.6g} s: {places}; "
-            f"peak ball force {self.peak_ball_force:.6g} N)"
+            f"peak {self._noun} force {self.peak_ball_force:.6g} N)"
         )
+
+    @property
+    def _noun(self) -> str:
+        return bearing_words("ball", self.model.manifest.bearings)
 
     @property
     def _found(self) -> dict[str, float]:
@@ -121,11 +126,15 @@ class StaticEquilibrium(Reported):
         right = ("position or deflection, µm", "elastic force, N")
         table = ReportTable(
             title=f"Static equilibrium at t = {self.time:.6g} s",
-            heads=("position or ball", *right),
+            heads=(f"position or {self._noun}", *right),
             rows=[
                 *((name, f"{1e6 * q:z.6g}") for name, q in self._found.items()),
                 *(
-                    (f"ball {ball['ball']}", f"{1e6 * ball['deflection']:z.6g}", f"{ball['elastic_force']:z.6g}")
+                    (
+                        f"{self._noun} {ball['ball']}",
+                        f"{1e6 * ball['deflection']:z.6g}",
+                        f"{ball['elastic_force']:z.6g}",
+                    )
                     for ball in balls
                 ),
             ],
@@ -184,7 +193,7 @@ class StaticEquilibrium(Reported):
         if len(self.free_directions):
             raise RequestError(
                 "static equilibrium: a ring is free to move along some direction, so that its place is not a function "
-                "of the parameters. Give a preload, or another instant or ball angle."
+                f"of the parameters. Give a preload, or another instant or {self._noun} angle."
             )
         directions = _with_driver(self.model, self.numbers, self.time, names)
         there = point(self.model, self.numbers, self.time, self.x)
@@ -291,7 +300,8 @@ def static_equilibrium(
     if len(free):
         warnings.warn(
             f"static_equilibrium: the rings can move without force along {len(free)} direction(s), mostly "
-            f"{_mostly(found)}: the place given is one of many (one loaded ball does not hold a ring sideways).",
+            f"{_mostly(found)}: the place given is one of many (one loaded {found._noun} does not hold a ring "
+            "sideways).",
             FreeRingWarning,
             stacklevel=3,
         )
@@ -313,8 +323,9 @@ def start_at_rest(model: LoadedModel, numbers: Numbers) -> Array:
         raise RequestError(
             f'initial = "equilibrium": the load at the start does not hold the rings: along '
             f"{len(found.free_directions)} direction(s), mostly {_mostly(found)}, they can move without force, so that "
-            "they have no single rest place. Give a negative clearance (preload), another start or ball angle, where "
-            "two balls carry, or a state: initial = model.static_equilibrium().x takes one of the many."
+            "they have no single rest place. Give a negative clearance (preload), another start or "
+            f"{found._noun} angle, where two {found._noun}s carry, or a state: "
+            "initial = model.static_equilibrium().x takes one of the many."
         )
     return found.x
 
@@ -438,8 +449,9 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     free = vectors[:, alone].T
     state = np.concatenate([q, velocity])
     if len(free) and not np.any(applied) and float(np.max(_balls(model, numbers, t, state)[0])) < 0.0:
+        words = bearing_words("no ball touches", model.manifest.bearings)
         raise RequestError(
-            "static_equilibrium: the inner ring carries no load and no ball touches: it may stand anywhere in its "
+            f"static_equilibrium: the inner ring carries no load and {words}: it may stand anywhere in its "
             "clearance. Give a load, or a negative clearance (preload)."
         )
     deflection, ball_force = _balls(model, numbers, t, state)

@@ -27,6 +27,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.report.short_words import head_lines, names_in_words
@@ -274,12 +275,13 @@ def _faster_damping(
 def _faster_note(model: LoadedModel, modes: Sequence[Mode], faster: Sequence[Mode], passing: float) -> str:
     laws = {bearing.damping.law for bearing in model.manifest.bearings if bearing.damping.corner_at_rest}
     least, other = (min((m.damping_ratio for m in some if not m.rigid), default=math.nan) for some in (modes, faster))
-    return (
+    words = (
         f"the law {' and '.join(sorted(laws))} damps approach only, and the balls pass at up to {passing:.2g} m/s "
         "while the rings rest: a ball that parts, however slowly, counts as undamped, and one that approaches as "
         "damped all the time. That holds for slower vibrations. In any faster one each ball damps half of the time: "
         f"the least ratio is then {other:.3g} instead of {least:.3g}."
     )
+    return bearing_words(words, model.manifest.bearings)
 
 
 def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
@@ -336,9 +338,9 @@ def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
         touching = [k for k in found.at_onset() if abs(found.rate[k]) > 0.0 or jumps]
         if touching:
             notes.append(
-                f"the law {bearing.damping.law} has no derivative at contact onset, where {named(touching)} stands: "
-                f"the derivative is that of the free side. Give {bearing.path}.contact.smoothing, and there is one "
-                "derivative."
+                f"the law {bearing.damping.law} has no derivative at contact onset, where {named(bearing, touching)} "
+                f"stands: the derivative is that of the free side. Give {bearing.path}.contact.smoothing, and there "
+                "is one derivative."
             )
     return tuple(notes)
 

@@ -27,6 +27,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, STATES, JacobianDirections, Rows, contract, directions_of, rows_of
+from ballpass.runtime.ratings.of_bearing import bearing_words
 
 Array = NDArray[np.float64]
 
@@ -76,8 +77,8 @@ class Slopes:
         if not np.any(self.differ):
             return ()
         return tuple(
-            f"the law {bearing.damping.law} has a kink where the deflection's rate is zero, as at {named(balls)}, and "
-            "not every derivative exists: the mean of both sides is given. Give "
+            f"the law {bearing.damping.law} has a kink where the deflection's rate is zero, as at "
+            f"{named(bearing, balls)}, and not every derivative exists: the mean of both sides is given. Give "
             f"{bearing.path}.damping.smoothing, and there is one derivative."
             for bearing, balls in self.resting
             if balls
@@ -191,9 +192,9 @@ class Deflections:
         return rates, by_time
 
 
-def named(balls: Sequence[int]) -> str:
+def named(bearing: BearingInfo, balls: Sequence[int]) -> str:
     """Names of balls, counted from 1."""
-    return "ball " + ", ".join(str(k + 1) for k in balls)
+    return bearing_words("ball ", [bearing]) + ", ".join(str(k + 1) for k in balls)
 
 
 def _arguments(direction: JacobianDirections) -> list[tuple[str, Array]]:

@@ -23,6 +23,7 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import ALSO, KINDS
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import no_output
 
@@ -129,7 +130,8 @@ def _parsed(
     ball = None if form["ball"] is None else int(form["ball"])
     if ball is not None and not (columns > 1 and 1 <= ball <= columns):
         allowed_balls = f"1 to {columns}" if columns > 1 else "none, for it has no balls"
-        raise RequestError(f"{text}: ball {ball} was given; {form['channel']} allows {allowed_balls}.")
+        words = f"ball {ball} was given; {form['channel']} allows {allowed_balls}."
+        raise RequestError(f"{text}: {bearing_words(words, manifest.bearings)}")
     place = form["place"] or ""
     _check_place(manifest, text, found, place)
     unit = found.unit or (found.unit_of(unit) if found.unit_of else unit)
@@ -227,13 +229,18 @@ def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
     if kind.takes != "channel":
         named = (one.name for one in manifest.bearings if one.name and quantity.channel.startswith(one.prefix))
         return ", ".join(
-            [kind.words or kind.summary, *(f"bearing {name}" for name in named), *filter(None, [quantity.place])]
+            [
+                bearing_words(kind.words or kind.summary, manifest.bearings),
+                *(f"bearing {name}" for name in named),
+                *filter(None, [quantity.place]),
+            ]
         )
     described = {info.name: info.description for info in manifest.quantities}
     described |= {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
     which = r"any \1" if quantity.ball is None else rf"\1 {quantity.ball}"
     channel = re.sub(r"each (ball|roller)", which, described[quantity.channel])
-    return f"{channel}, {kind.words or kind.name} {quantity.place}".rstrip()
+    words = bearing_words(kind.words or kind.name, manifest.bearings, quantity.channel)
+    return f"{channel}, {words} {quantity.place}".rstrip()
 
 
 def default_quantities(manifest: Manifest) -> tuple[str, ...]:

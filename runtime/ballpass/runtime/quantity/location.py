@@ -18,7 +18,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
-from ballpass.runtime.ratings.of_bearing import TURNS, contact_cosine
+from ballpass.runtime.ratings.of_bearing import TURNS, bearing_words, contact_cosine
 from ballpass.runtime.run import driver_angle
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
@@ -100,8 +100,9 @@ def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Q
     if quantity.place in _FREQUENCIES and quantity.place != "shaft":
         bearing = _bearing_of(manifest, quantity)
         if abs(values[bearing.ring_speed]) <= TURNS * abs(driver_angle.shaft_speed(manifest, values)):
+            words = bearing_words("no ball passes", [bearing])
             raise RequestError(
-                f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that no ball passes "
+                f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that {words} "
                 "at a frequency of its own. Allowed: @shaft, an order as in @2x, a frequency as in @250Hz."
             )
 

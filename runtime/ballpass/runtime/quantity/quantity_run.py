@@ -41,6 +41,7 @@ from ballpass.runtime.quantity.panels import GAUSS, ROUGH
 from ballpass.runtime.quantity.passages import passage_slopes, wrap_slopes
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import KeptSteps, ReductionRow, Sink, start_run
@@ -165,8 +166,9 @@ class QuantityRun:
         """
         for item in self._moving:
             if kind_of(item).extremes and jumps(self.model, item.channel):
+                ball = bearing_words("a ball", self.model.manifest.bearings, item.channel)
                 raise RequestError(
-                    f"{item.name}: {item.channel} jumps where a load within a window begins or ends, or a ball enters "
+                    f"{item.name}: {item.channel} jumps where a load within a window begins or ends, or {ball} enters "
                     "or leaves a spall, at a time that the motion decides; on which side of the jump the extreme is, "
                     "is not followed. Allowed: extremes of states and all else that does not jump; means and integrals "
                     "of all. Or give the load as a table over the angle, with flanks as steep as they are."

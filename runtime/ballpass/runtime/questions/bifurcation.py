@@ -20,6 +20,7 @@ from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.show.progress import Progress, shown
@@ -328,7 +329,8 @@ def _strobe(
     def drifts(given: Mapping[str, float]) -> Collection[float]:
         return phase_drifts(model, model.numbers(given), run.t, run.x, model.period(given)).values()
 
-    return model.period, "once a turn, after which balls or loads are elsewhere", drifts
+    words = bearing_words("once a turn, after which balls or loads are elsewhere", model.manifest.bearings)
+    return model.period, words, drifts
 
 
 def _motion(

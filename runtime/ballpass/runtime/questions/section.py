@@ -21,6 +21,7 @@ from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
@@ -162,14 +163,14 @@ class PoincareSection(ShortRepr, Reported):
             around = f", so that they go round once in {self.turns / abs(drift):.4g} turns" if drift else ""
             harmonics = "1 harmonic" if self.curve.harmonics == 1 else f"{self.curve.harmonics} harmonics"
             parts.append(
-                f"From point to point the balls move by {drift:.6g} of a {self.around} beyond whole ones{around}. The "
-                f"curve has {harmonics}, fitted to every second point; off curve: how far "
+                f"From point to point the rolling elements move by {drift:.6g} of a {self.around} beyond whole "
+                f"ones{around}. The curve has {harmonics}, fitted to every second point; off curve: how far "
                 "the others are from it, in shares of the points' spread."
             )
         if self.kind == "on a closed curve":
             parts.append(
-                f"Within {100.0 * ON_CURVE:g} % the state follows the balls: quasi-periodic. Few points of such a "
-                "curve look like separate parts."
+                f"Within {100.0 * ON_CURVE:g} % the state follows the rolling elements: quasi-periodic. Few points of "
+                "such a curve look like separate parts."
             )
         elif self.kind == "on no smooth curve":
             parts.append(
@@ -259,7 +260,7 @@ def section(
             progress=False,
         )
     period = turns * period_of(run.x, np.array(run.statistics.magnitudes))
-    phase, around, curve = np.zeros(readings), PITCH, None
+    phase, around, curve = np.zeros(readings), bearing_words(PITCH, manifest.bearings), None
     others: tuple[str, ...] = ()
     if len(manifest.bearings) == 1:
         pick = np.linspace(0, readings - 1, MOMENTS).astype(int)

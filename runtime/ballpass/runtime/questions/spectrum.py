@@ -14,6 +14,7 @@ from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Tr
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.sensor import Sensor, sensor_of_text
@@ -204,6 +205,7 @@ class SignalSpectrum(ShortRepr, Reported):
         said = [f"{marks}{unit}; lines of the spectrum are {self.resolution:.3g}{unit} apart"] if marks else []
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
+        abbreviated = bearing_words(abbreviated, self.solution.manifest.bearings)
         said += [abbreviated] if abbreviated else []
         factor, shown = table_unit(self.unit)
         said.append(
@@ -365,7 +367,8 @@ def spectrum(
             progress=progress,
         )
     if run[of].ndim != 1:
-        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
+        ball = bearing_words("ball", run.manifest.bearings, of)
+        raise RequestError(f"--of: {of} has one value for each {ball}. Allowed: an output with one value, as inner.ax.")
     if sensor is not None:
         run = replace(run, outputs={**run.outputs, of: _measured(run, of, sensor)})
     solution = run.steady()

@@ -222,7 +222,8 @@ class SteadyState(ShortRepr, Reported):
         if self.difference > SAME:
             warnings.append(
                 f"{self.turns:g} turns are no period of this machine: at one state the accelerations at both ends "
-                f"differ by {rounded(100.0 * self.difference, 2)} %. Loads or balls are elsewhere. Leave turns away."
+                f"differ by {rounded(100.0 * self.difference, 2)} %. Loads or rolling elements are elsewhere. "
+                "Leave turns away."
             )
         facts = {
             **self._named("period", "turns", "forcing", "repeats", "sooner"),

@@ -6,14 +6,14 @@ In: the manifest's record of a bearing, and values of parameters by name (floats
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.ratings.branches import cosine
-from ballpass.runtime.ratings.elements import RATED, ElementGeometry, RacewayContact, RatedElement
+from ballpass.runtime.ratings.elements import RATED, ElementGeometry, RacewayContact, RatedElement, element_words
 from ballpass.runtime.ratings.life import ElementLife
 
 __all__ = ["RacewayContact"]
@@ -79,6 +79,11 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     )
 
 
+def bearing_words(text: str, bearings: Iterable[BearingInfo], channel: str = "") -> str:
+    """A text on balls, with what they are called in the bearings, or in that one of them which has the output."""
+    return element_words(text, [one.element for one in bearings if not channel or channel.startswith(one.prefix)])
+
+
 def rated_element(bearing: BearingInfo) -> RatedElement:
     """The bearing's rolling element as standards rate it."""
     return RATED[bearing.element]
@@ -131,8 +136,8 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
         return f"{name} does not turn: rating lives count turns. Judge it by its static safety."
     return (
         f"{name} swings: its inner ring has no mean speed against the outer one. ISO 281 and ISO 16281 hold for "
-        "bearings that turn. Watch for fretting (false brinelling) at the places where the balls stand; judge the load "
-        "by the static safety."
+        "bearings that turn. Watch for fretting (false brinelling) at the places where the rolling elements stand; "
+        "judge the load by the static safety."
     )
 
 

@@ -45,8 +45,8 @@ class Oscillation:
         if self.amplitude >= self.critical:
             return found
         return (
-            f"{found} Below ±{math.degrees(self.critical):.3g} deg balls do not meet each other's ways: take this as "
-            "an estimate, and watch for fretting."
+            f"{found} Below ±{math.degrees(self.critical):.3g} deg rolling elements do not meet each other's ways: "
+            "take this as an estimate, and watch for fretting."
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
@@ -33,6 +34,7 @@ class FailureLocation:
     ball : the ball with the largest deflection, counted from 1; None without a bearing or a finite state
     ball_angle : its angle, in [0, 2 pi) [rad]
     deflection : its deflection, Eq. (6); negative where no ball touches [m]
+    element : kind of the rolling elements
     """
 
     crank_angle: float
@@ -40,6 +42,7 @@ class FailureLocation:
     ball: int | None
     ball_angle: float
     deflection: float
+    element: str = "ball"
 
     @property
     def words(self) -> str:
@@ -47,9 +50,9 @@ class FailureLocation:
         if self.ball is None:
             return ""
         if self.deflection <= 0.0:
-            return "No ball is in contact there."
+            return element_words("No ball is in contact there.", [self.element])
         angle = math.degrees(self.ball_angle)
-        ball = f"ball {self.ball}" + (f" of {self.bearing}" if self.bearing else "")
+        ball = element_words(f"ball {self.ball}", [self.element]) + (f" of {self.bearing}" if self.bearing else "")
         return f"Most deflected there: {ball} at {angle:.2f} deg, by {rounded(1e6 * self.deflection)} µm."
 
 
@@ -80,6 +83,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
                 ball=ball + 1,
                 ball_angle=float(angles[ball]),
                 deflection=float(deflections[ball]),
+                element=bearing.element,
             )
     return found
 

@@ -18,6 +18,7 @@ from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes, seal
 from ballpass.runtime.run.reductions import Reductions
@@ -337,7 +338,11 @@ def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
         balls = _ball_dimension(manifest, name)
         found[name] = (("time", balls), samples, _attributes(infos[name]))
         numbers = np.arange(1, samples.shape[1] + 1)
-        found[balls] = ((balls,), numbers, {"units": "1", "long_name": "number of the ball"})
+        found[balls] = (
+            (balls,),
+            numbers,
+            {"units": "1", "long_name": bearing_words("number of the ball", manifest.bearings, name)},
+        )
     facts: dict[str, Any] = {
         "title": manifest.title,
         "scene": manifest.scene,

@@ -15,6 +15,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.show.short import ShortRepr
@@ -119,10 +120,11 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
     )
     moved = np.abs((others - angles + math.pi) % driver_angle.TURN - math.pi)
     if np.max(moved) > SAME_ANGLE * max(1.0, end.time / driver_angle.period(model.manifest, numbers.values)):
-        what = "the driver" if moved[0] == np.max(moved) else "balls"
+        balls = bearing_words("balls", model.manifest.bearings)
+        what = "the driver" if moved[0] == np.max(moved) else balls
         raise RequestError(
             f"initial: with {', '.join(changed)} changed, {what} would jump by "
             f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run continues. Allowed: "
-            "parameters that leave driver and balls where they are. Give them as they were, or start anew from the "
+            f"parameters that leave driver and {balls} where they are. Give them as they were, or start anew from the "
             "state alone: initial=solution.end.x."
         )

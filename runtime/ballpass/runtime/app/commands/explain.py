@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
-from ballpass.runtime.ratings.elements import RATED
+from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report
 
@@ -79,19 +79,18 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
                 "rest": _rest(shares, counted) if rest else None,
             }
         )
-    noun = _noun(scene.bearings)
 
     def worded(text: str) -> str:
-        return re.sub(r"\bball(s?)\b", rf"{noun}\1", text)
+        return element_words(text, [bearing.element for bearing in scene.bearings])
 
-    absent = [*_absent(scene), *_NEVER, *_of_drive(scene)]
+    never = [*map(worded, _NEVER)]
     return {
         "scene": scene.name,
         "mechanism": scene.mechanism is not None,
         "title": scene.title,
         "file": str(path),
         "modelled": parts,
-        "not_modelled": [worded(text) for text in absent],
+        "not_modelled": [*_absent(scene), *never, *_of_drive(scene)],
         "functions": {f.name: {"operations": f.operations, "what": worded(f.description)} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
         **said.to_json(),
@@ -114,15 +113,11 @@ def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int
     parts = {
         "load and mechanism": kernels["stage"],
         "motion of the rings": kernels["relative"] + kernels["acceleration"],
-        f"{_noun(bearings)} contacts": sum(b.balls * (kernels[f"{b.prefix}ball.forces"] + around) for b in bearings),
+        element_words("ball contacts", [b.element for b in bearings]): sum(
+            b.balls * (kernels[f"{b.prefix}ball.forces"] + around) for b in bearings
+        ),
     }
     return parts | {"all": sum(parts.values())}
-
-
-def _noun(bearings: Sequence[Bearing]) -> str:
-    """What the rolling elements of all bearings are called; "ball" where they differ."""
-    nouns = {RATED[bearing.element].noun for bearing in bearings}
-    return nouns.pop() if len(nouns) == 1 else "ball"
 
 
 def _of_drive(scene: Scene) -> list[str]:
@@ -147,20 +142,28 @@ def _absent(scene: Scene) -> list[str]:
             out.append("stops and friction of joints ([mechanism.stops.NAME], torsion_stops, friction, guide_friction)")
     if not scene.bearings:
         out.append("a bearing: forces of the mechanism only ([bearing])")
+    left: dict[tuple[str, str], list[str]] = {}  # words and key: the bearings without it
     for bearing in scene.bearings:
-        path = bearing.path
+        lacking = []
         if mechanism is not None and bearing.coupling == "one-way":
-            out.append(f'play and forces of the bearing that act back on the linkage ({path}.coupling = "two-way")')
+            words = "play and forces of the bearing that act back on the linkage"
+            lacking.append((words, 'coupling = "two-way"'))
         if not bearing.damping.numbers:
-            out.append(f"damping at the balls ({path}.damping)")
+            lacking.append(("damping at the balls", "damping"))
         if bearing.inner is not None and bearing.inner.damping is None:
-            out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
+            lacking.append(("viscous damping of the inner ring to the frame", "inner_ring.damping"))
         if bearing.outer is None:
-            out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')
+            lacking.append(("motion of the outer ring", 'outer_ring, support = "elastic"'))
         if not (bearing.cage and bearing.cage.slipping):
-            out.append(f"slip of the cage ({path}.cage.slip)")
+            lacking.append(("slip of the cage", "cage.slip"))
         present = {effect.kind for effect in bearing.effects}
-        out += [f"{effect.words} ({path}.{kind})" for kind, effect in EFFECTS.items() if kind not in present]
+        lacking += [(effect.words, kind) for kind, effect in EFFECTS.items() if kind not in present]
+        for words, key in lacking:
+            left.setdefault((element_words(words, [bearing.element]), key), []).append(bearing.name)
+    for (words, key), names in left.items():
+        path = f"bearings.{names[0]}" if len(names) == 1 and names[0] else "bearings.NAME" if names[0] else "bearing"
+        named = f"; NAME: {', '.join(names)}" if len(names) > 1 else ""
+        out.append(f"{words} ({path}.{key}{named})")
     return out
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ballpass.runtime.quantity.passages import is_wrapped
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
+from ballpass.runtime.ratings.of_bearing import bearing_words
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -36,7 +37,7 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
     if mark.other is not None and mark.rate != mark.other_rate:
         # two balls carry the same load; the moment moves so that both stay equal
         slope = slope + mark.rate * _rank_change(view, quantity, mark)
-        notes.append(f"balls {mark.ball + 1} and {mark.other + 1} change rank there")
+        notes.append(_words(view, quantity, f"balls {mark.ball + 1} and {mark.other + 1} change rank there"))
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
     if is_wrapped(quantity.channel) and abs(abs(mark.value) - math.pi) < AT_JUMP:
@@ -120,7 +121,11 @@ def _competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
         if change.size and change[k] < nearest:
             nearest = change[k]
             places = [
-                f"t = {one.time:.6g} s{f', ball {one.ball + 1}' if signal.value.shape[1] > 1 else ''}"
+                _words(
+                    view,
+                    quantity,
+                    f"t = {one.time:.6g} s{f', ball {one.ball + 1}' if signal.value.shape[1] > 1 else ''}",
+                )
                 for one in (other, mark)
             ]
             words = (
@@ -128,6 +133,10 @@ def _competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
                 f"that at {places[1]}, and makes the derivative {its[k]:.4g} instead of {slope[k]:.4g}"
             )
     return words
+
+
+def _words(view: View, quantity: Quantity, text: str) -> str:
+    return bearing_words(text, view.manifest.bearings, quantity.channel)
 
 
 def _scale(view: View, name: str) -> float:
