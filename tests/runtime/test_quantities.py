@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from ballpass.runtime import KinkWarning, Model, QuantityFunction, RequestError
@@ -358,3 +359,20 @@ def test_parameters_are_chosen_by_patterns_too(make_model: Callable[..., Model])
 def test_quantities_have_words_for_figures(make_model: Callable[..., Model], name: str, words: str) -> None:
     manifest = make_model("punching_press").manifest
     assert quantity_words(manifest, parse_quantity(manifest, name)) == words
+
+
+def test_angles_of_driver_and_cage_do_not_depend_on_edges_of_loads(make_model: Callable[..., Model]) -> None:
+    """They grew on from the last edge of a load: over a turn of the press the driver's angle was up to 597 degrees."""
+    model = make_model("punching_press", ('"drive_torque"]', '"drive_torque", "drive_angle", "cage.*"]'))
+    angles = ("drive_angle", "cage.in_outer", "cage.in_inner")
+    found = model.quantities([f"{kind}:{angle}" for angle in angles for kind in ("max", "min", "mean", "rms")], 4)
+    share = model.constants()["bearing.cage_ratio"]
+    turned = np.linspace(2.0, 4.0, 2_000_001) * 2.0 * np.pi  # of the driver, in turns two to four
+    expected = {
+        "drive_angle": turned % (2.0 * np.pi),
+        "cage.in_outer": np.angle(np.exp(1j * share * turned)),
+        "cage.in_inner": np.angle(np.exp(1j * (share - 1.0) * turned)),
+    }
+    for name, angle in expected.items():
+        got = [found[f"{kind}:{name}"].value for kind in ("max", "min", "mean", "rms")]
+        assert got == pytest.approx([max(angle), min(angle), np.mean(angle), np.sqrt(np.mean(angle**2))], abs=1e-5)

@@ -15,6 +15,7 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Mechanism
+from ballpass.derive.terms import TIME
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output
 
 #: Key of the scene file under which its outputs stand.
@@ -52,7 +53,9 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     ]
     for ring, angle in (("outer", ball.in_outer), ("inner", ball.in_inner)):
         words = f"Angle of {noun} 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
-        out.append(Output(name=f"{prefix}cage.in_{ring}", expression=angle, unit="rad", description=words))
+        # with time in it the angle grows on from one reference time to the next; else the driver's whole turns count
+        seen = _within_turn(angle, -sp.pi) if angle.has(TIME) else angle
+        out.append(Output(name=f"{prefix}cage.in_{ring}", expression=seen, unit="rad", description=words))
     for axis, total in zip("xy", ball.ring_force, strict=True):
         words = f"Force of the inner ring on the {noun}s{of} along {axis}, Eqs. (8) and (9)"
         out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total, unit="N", description=words))
@@ -92,7 +95,8 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
     angle = drive.coordinate
     if angle is None:
         words = "Angle of the driven body, within the turn"
-        out.append(Output(name="drive_angle", expression=DRIVER_ANGLE, unit="rad", description=words))
+        within = _within_turn(DRIVER_ANGLE, sp.S.Zero)
+        out.append(Output(name="drive_angle", expression=within, unit="rad", description=words))
     else:
         rows = (
             ("drive_power", torque * angle.velocity, "W", "Power of the drive"),
@@ -112,6 +116,12 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
             )
         )
     return out
+
+
+def _within_turn(angle: sp.Expr, first: sp.Expr) -> sp.Expr:
+    """The angle without whole turns, from `first` on [rad]."""
+    turn = 2 * sp.pi
+    return angle - turn * sp.floor((angle - first) / turn, evaluate=False)
 
 
 def is_asked(patterns: tuple[str, ...], name: str) -> bool:

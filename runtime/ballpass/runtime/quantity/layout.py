@@ -34,7 +34,7 @@ from ballpass.runtime.quantity.panels import (
     split,
     uniform_panels,
 )
-from ballpass.runtime.quantity.passages import Passages, find_passages, find_wraps, is_wrapped, no_passages
+from ballpass.runtime.quantity.passages import Passages, find_passages, find_wraps, jumps_at, no_passages
 from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
@@ -159,7 +159,7 @@ class NodeLayer:
         for item in noded:
             moment, resolved = kind_of(item).at_moment, not self._is_found(item)
             graded = resolved and item.channel not in self.model.states
-            wrapped = item.channel if is_wrapped(item.channel) and self._is_kinked(item) else ""
+            wrapped = item.channel if jumps_at(item.channel) is not None and self._is_kinked(item) else ""
             sort = _Sort(moment=moment, still=self.is_still(item), graded=graded and not moment, wrapped=wrapped)
             sorts[sort].append(item)
         found: list[Layout] = []

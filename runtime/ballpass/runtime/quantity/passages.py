@@ -187,26 +187,31 @@ def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sen
     return np.asarray(-found["distance"].slope[rows, passages.columns] / rate[:, None])
 
 
-def is_wrapped(channel: str) -> bool:
-    """Whether a channel is an angle in (-pi, pi], which jumps where a body makes whole turns."""
-    return channel.startswith("body.") and channel.endswith(".angle")
+def jumps_at(channel: str) -> float | None:
+    """Angle at which a channel jumps by a turn, where a body makes whole turns [rad]; None of all but angles."""
+    if channel == "drive_angle":
+        return 0.0
+    in_half_turns = channel.endswith(("cage.in_outer", "cage.in_inner"))
+    return np.pi if in_half_turns or (channel.startswith("body.") and channel.endswith(".angle")) else None
 
 
 def find_wraps(run: Run, track: Track, angle: ChannelValues, *, still: bool) -> Array:
-    """Times at which an angle jumps from pi to -pi or back, shape (wraps,) [s].
+    """Times at which an angle jumps by a turn, shape (wraps,) [s].
 
     Parameters
     ----------
     angle : the channel
     still : whether it follows from time alone
     """
-    value = angle.along(track, run.numbers)[angle.channels[0]].value[:, 0]
+    at = jumps_at(angle.channels[0])
+    assert at is not None  # it is an angle
+    past = angle.along(track, run.numbers)[angle.channels[0]].value[:, 0] - at
     # a body that stands at pi is on either side of it by rounding
-    across = np.where((np.cos(value) < 0.0) & (np.abs(np.sin(value)) > ROUNDING), np.sin(value), 0.0)
+    across = np.where((np.cos(past) > 0.0) & (np.abs(np.sin(past)) > ROUNDING), np.sin(past), 0.0)
     times = crossings(track.nodes.t, track.nodes.segment, across)
     for _ in range(NEWTON if len(times) else 0):
         value, rate = (found[:, 0] for found in angle.with_rates(_there(run, track, times, still=still), run.numbers))
-        times = times + np.angle(-np.exp(-1j * value)) / rate
+        times = times - np.angle(np.exp(1j * (value - at))) / rate
     edges = track.edges.times
     return np.array([time for time in times.tolist() if np.min(np.abs(edges - time)) > APART * run.duration])
 

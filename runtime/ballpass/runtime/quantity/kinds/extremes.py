@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ballpass.runtime.quantity.passages import is_wrapped
+from ballpass.runtime.quantity.passages import jumps_at
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.run.driver_angle import TURN
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -22,7 +23,7 @@ SECOND = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / 180.0
 #: A change of a parameter by this share of its value, or of a radian, is a small one [1].
 NEAR = 1e-3
 
-#: An extreme of an angle in (-pi, pi] that is nearer to pi is where it jumps [rad].
+#: An extreme of an angle without whole turns that is nearer to where it jumps is there [rad].
 AT_JUMP = 1e-5
 
 #: Derivatives (p/Q) dQ/dp that differ by less are one: by this share of the larger one, and by themselves [1].
@@ -40,9 +41,11 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
         notes.append(_words(view, quantity, f"balls {mark.ball + 1} and {mark.other + 1} change rank there"))
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
-    if is_wrapped(quantity.channel) and abs(abs(mark.value) - math.pi) < AT_JUMP:
-        notes.append("the angle jumps there, from pi to -pi or back")
-        mark, slope = replace(mark, value=math.copysign(math.pi, mark.value), competing=()), np.zeros(view.directions)
+    jump = jumps_at(quantity.channel)
+    if jump is not None and abs(math.remainder(mark.value - jump, TURN)) < AT_JUMP:
+        notes.append("the angle jumps there by a turn")
+        value = mark.value - math.remainder(mark.value - jump, TURN)
+        mark, slope = replace(mark, value=value, competing=()), np.zeros(view.directions)
     # the minimum over the most loaded balls is not an extreme of one ball
     ranked = kind == "min" and signal.value.shape[1] > 1 and quantity.ball is None
     kink = "" if ranked else _competing_peak(view, quantity, mark)
