@@ -32,7 +32,7 @@ RANGE = "bearing.clearance=1 um:2 um"
 #: What each command must have beside the option in question, by parameter.
 NEEDED: Mapping[str, Mapping[str, str]] = {
     "bifurcation": {"vary": f"{RANGE}:2"},
-    "fit": {"data": "none.csv", "vary": RANGE},
+    "fit": {"data": "signal.csv", "vary": RANGE},
     "jacobian": {"of": "rhs", "wrt": "states"},
     "morris": {"vary": RANGE, "of": "rms:inner.y"},
     "optimize": {"minimize": "rms:inner.y", "vary": RANGE},
@@ -42,9 +42,17 @@ NEEDED: Mapping[str, Mapping[str, str]] = {
     "sweep": {"vary": f"{RANGE}:2"},
 }
 
-#: A name that the scene has not, as an option of this placeholder is written; then one of a kind that no scene has.
+#: Measured data by the name of their file.
+DATA = {
+    "signal.csv": "time,inner.y\n0,1\n",
+    "max.csv": "quantity,value\nmax:inner.q,1\n",
+    "mx.csv": "quantity,value\nmx:inner.y,1\n",
+}
+
+#: A name that the scene has not, as an option of this placeholder is written; then what no scene has.
 UNKNOWN: Mapping[str | None, tuple[str, ...]] = {
-    "Q": ("max:inner.q", "mx:inner.y"),
+    "Q": ("max:inner.q", "mx:inner.y", "value:inner.y@2x"),
+    "DATA": ("max.csv", "mx.csv"),
     '"Q <= VALUE"': ("max:inner.q <= 1 um", "mx:inner.y <= 1 um"),
     "P": ("bearing.clearanc",),
     "PATH=A:B": ("bearing.clearanc=1 um:2 um",),
@@ -57,6 +65,9 @@ UNKNOWN: Mapping[str | None, tuple[str, ...]] = {
     "CHOICE": ("locate",),
     None: ("inner.q",),
 }
+
+#: What names no quantity of any scene begins with.
+NOWHERE = ("mx", "value:inner.y@2x")
 
 QUESTIONED = {declared(question).name: question for question in (*QUESTIONS, trade)}
 COMMANDS: Mapping[str, Callable[..., Any]] = {
@@ -83,6 +94,8 @@ def model(make_model: Callable[..., Model]) -> Model:
 def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A scene that nothing was derived of, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
+    for name, text in DATA.items():
+        Path(name).write_text(text)
     return Path(shutil.copy(SCENE, tmp_path / "alone.toml"))
 
 
@@ -135,7 +148,7 @@ def test_a_name_that_there_is_not_is_refused_before_c_is_generated_in_the_words_
     option: Option,
     text: str,
 ) -> None:
-    alike_in_every_scene = text.startswith("mx:") or name == "method"
+    alike_in_every_scene = text.startswith(NOWHERE) or name == "method"
     monkeypatch.setattr(generating, "_derive_and_lower", never if alike_in_every_scene else lambda *_: derived)
     monkeypatch.setattr(emitted, "write_folder", never)
     monkeypatch.setattr("ballpass.runtime.model.compile_model", never)
@@ -184,7 +197,7 @@ def test_several_wrong_names_have_one_message_for_each_stage(
 def test_a_data_set_refuses_unknown_quantities_before_c_is_generated(
     alone: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
-    if text.startswith("mx:"):
+    if text.startswith(NOWHERE):
         monkeypatch.setattr(generating, "_derive_and_lower", never)
     monkeypatch.setattr(emitted, "write_folder", never)
     spec = alone.with_name("set.toml")
@@ -194,7 +207,8 @@ def test_a_data_set_refuses_unknown_quantities_before_c_is_generated(
     spec.write_text(f'scene = "{alone.name}"\nquantities = ["{text}"]\n{numbers}')
     done = CliRunner().invoke(app, ["dataset", str(spec)])
     assert done.exit_code == 2, (done.output, done.exception)
-    assert ("There is no kind of quantity 'mx'" if text.startswith("mx:") else "'inner.q'") in done.output
+    expected = {"mx:": "no kind of quantity 'mx'", "max": "'inner.q'", "val": "is expected, not '2x'"}
+    assert expected[text[:3]] in " ".join(done.output.split())
 
 
 def test_a_generated_folder_is_not_compiled_for_an_unknown_name(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -151,6 +151,15 @@ def test_a_method_that_is_named_is_that_of_derivatives_too(press: Model) -> None
     assert [one.value for one in found.quantities] == [one.value for one in press.quantities(names, **options).values()]
 
 
+def test_a_report_of_derivatives_names_the_run_that_has_its_values(press: Model) -> None:
+    names, length = ["max:ball.force", "rms:inner.y", "amplitude:inner.y@2x"], {"cycles": 1.5, "transient": 0.5}
+    report = press.sensitivity(names, CLEARANCE, check=False, **length)
+    options = {name: report.settings[name] for name in ("method", "rtol", "kinks")}
+    again = press.quantities(names, **length, **options)
+    assert [one.value for one in report.quantities] == [one.value for one in again.values()]
+    assert all(str(value) in str(report) for value in (options["method"], options["kinks"]))
+
+
 def test_every_kind_has_an_error_and_a_derivative(press: Model, expected: dict[str, float]) -> None:
     """A run to a named error keeps it; derivatives are there, and verified or said to be none."""
     target = 1e-3

@@ -245,8 +245,20 @@ def _quantity(what: str, text: str, unit: str) -> float:
         raise RequestError(f"{what}: {error}") from None
 
 
-def _csv(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
-    """Columns with their units, or rows of quantities, and assignments in comments."""
+def quantities_in(source: Source) -> list[str]:
+    """Names of quantities in the rows of a CSV file; none of other files, and of mappings."""
+    if not isinstance(source, str | Path) or Path(source).suffix == ".nc":
+        return []
+    heads, rows, _ = _lines(source)
+    return [cells[0].strip() for cells in csv.reader(rows[1:])] if _are_quantities(heads) else []
+
+
+def _are_quantities(heads: Sequence[tuple[str, str]]) -> bool:
+    return bool(heads) and heads[0][0] == "quantity"
+
+
+def _lines(path: str | Path) -> tuple[list[tuple[str, str]], list[str], dict[str, str]]:
+    """Names and units of the columns of a CSV file, its lines from the first one on, and assignments in comments."""
     try:
         text = read_file(path, LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
@@ -255,8 +267,13 @@ def _csv(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
     lines = [line for line in text.splitlines() if line.strip()]
     said = dict(_assigned(line) for line in lines if line.startswith("#") and "=" in line)
     rows = [line for line in lines if not line.startswith("#")]
-    heads = [_head(cell) for cell in next(csv.reader(rows[:1]), [])]
-    if heads and heads[0][0] == "quantity":
+    return [_head(cell) for cell in next(csv.reader(rows[:1]), [])], rows, said
+
+
+def _csv(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
+    """Columns with their units, or rows of quantities, and assignments in comments."""
+    heads, rows, said = _lines(path)
+    if _are_quantities(heads):
         return {"quantity": (list(csv.reader(rows[1:])), "")}, said
     try:
         values = np.loadtxt(rows[1:], delimiter=",", ndmin=2, converters=lambda cell: float(cell.strip() or "nan"))

@@ -93,8 +93,8 @@ class SensitivityReport(Reported):
     words : description of each quantity and parameter, by name
     pairs : quantity by quantity, parameters in order
     grazing : where the trajectory grazes a kink
-    settings : cycles, transient, method, tolerances, steps
     elements : kinds of the bearings' rolling elements
+    settings : cycles, transient, method that ran, kinks, tolerances, steps
 
     Examples
     --------
@@ -337,7 +337,10 @@ def _remarks(report: SensitivityReport) -> list[Words]:
     ]
     tolerance = report.settings["sensitivity_rtol"]
     if tolerance is not None:
-        lines.append(f"derivatives at tolerance {tolerance:.0e}, {report.settings['steps']} steps")
+        lines.append(
+            "values of a run by {method}, relative tolerance {rtol:.0e}, kinks {kinks}, {steps} steps; "
+            "derivatives at tolerance {sensitivity_rtol:.0e}".format(**report.settings)
+        )
     reasons: dict[str, int] = {}
     for pair in report.pairs:
         if pair.check.verdict is Verdict.NOT_CHECKED and pair.check.reason:

@@ -161,8 +161,9 @@ def refuse_unknown(
     for name, (_, option) in options.items():
         value = values.get(name)
         if option.names is not None and value is not None:
+            is_several = isinstance(value, Sequence) and not isinstance(value, str)
             try:
-                option.names(manifest, name, [value] if isinstance(value, str) else list(value))
+                option.names(manifest, name, list(value) if is_several else [value])
             except RequestError as fault:
                 faults.append(str(fault))
     if faults:

@@ -76,8 +76,14 @@ def parse_quantities(manifest: Manifest, names: Sequence[str]) -> tuple[Quantity
 
 
 def refuse_unknown_kinds(names: Iterable[str]) -> None:
-    """Refuse kinds of quantities that no scene has, all at once: known before a scene is derived."""
-    _all_at_once(_kind_of, dict.fromkeys(names))
+    """Refuse kinds of quantities and places that no scene has, all at once: known before a scene is derived."""
+
+    def check(text: str) -> None:
+        kind = _kind_of(text)
+        if kind is not None:
+            _check_place(None, text, kind, text.partition("@")[2])
+
+    _all_at_once(check, dict.fromkeys(names))
 
 
 def _all_at_once(read: Callable[[_Given], _Found], given: Iterable[_Given]) -> list[_Found]:
@@ -204,7 +210,7 @@ def _explain_alone(manifest: Manifest, channels: Mapping[str, tuple[int, str]], 
         raise RequestError(f"{text}: the scene has several bearings, and this names none. Write {allowed}.")
 
 
-def _check_place(manifest: Manifest, text: str, kind: Kind, place: str) -> None:
+def _check_place(manifest: Manifest | None, text: str, kind: Kind, place: str) -> None:
     if kind.place is None:
         if place:
             raise RequestError(f"{text}: {kind.name} takes nothing after @. Omit @{place}.")

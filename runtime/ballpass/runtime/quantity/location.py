@@ -207,18 +207,18 @@ def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
     return 0.0, np.zeros(view.directions)
 
 
-def is_frequency(manifest: Manifest, place: str) -> bool:
-    """Whether the part after ``@`` is a frequency of this model."""
+def is_frequency(manifest: Manifest | None, place: str) -> bool:
+    """Whether the part after ``@`` is a frequency of this model; without one, of any."""
     form = _PLACE.fullmatch(place)
     if form is not None:
         return form["unit"] in ("Hz", "x")
-    return place in _FREQUENCIES and any(bearing.balls >= 1 for bearing in manifest.bearings)
+    return place in _FREQUENCIES and (manifest is None or any(bearing.balls >= 1 for bearing in manifest.bearings))
 
 
-def is_instant(manifest: Manifest, place: str) -> bool:
-    """Whether the part after ``@`` is a time, or an angle where something turns."""
+def is_instant(manifest: Manifest | None, place: str) -> bool:
+    """Whether the part after ``@`` is a time, or an angle where something turns, as it does without a manifest."""
     form = _PLACE.fullmatch(place)
-    turning = manifest.mechanism is not None or bool(manifest.bearings)
+    turning = manifest is None or manifest.mechanism is not None or bool(manifest.bearings)
     return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
 
 

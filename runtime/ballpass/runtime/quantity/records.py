@@ -52,12 +52,12 @@ class Place:
     Attributes
     ----------
     words, example : for messages
-    is_valid : whether a text is one, for a model
+    is_valid : whether a text is one, for a model; without a manifest for any
     """
 
     words: str
     example: str
-    is_valid: Callable[[Manifest, str], bool]
+    is_valid: Callable[[Manifest | None, str], bool]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -37,6 +37,7 @@ Data = Annotated[
         words="Files of measured signals, spectra or quantities: CSV or NetCDF, one for each trial.",
         shown="DATA",
         behind_scene=True,
+        names=option_names.measured_quantities,
     ),
 ]
 Vary = Annotated[

@@ -8,6 +8,7 @@ command line imports all options before it knows which one is given.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
@@ -95,6 +96,13 @@ def measured(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
     columns = read_columns(texts)
     if manifest is not None:
         measurable(manifest, columns)
+
+
+def measured_quantities(manifest: Manifest | None, option: str, sources: Sequence[Any]) -> None:
+    """Quantities that rows of files of measured data name; a file that cannot be read is refused as well."""
+    from ballpass.runtime.ask.measured import quantities_in
+
+    quantities(manifest, option, [name for source in sources for name in quantities_in(source)])
 
 
 def functions(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
