@@ -113,7 +113,7 @@ def said(command: str, scene: Path, given: Mapping[str, str]) -> str:
     words, options = [], {name: option for name, (_, option) in options_of(COMMANDS[command]).items()}
     for name, text in given.items():
         option = options.get(name, Option(words=""))
-        words += [text] if option.behind_scene else [option.flag(name), text]
+        words += [text] if option.positional else [option.flag(name), text]
     done = CliRunner().invoke(app, [command, str(scene), *words])
     assert done.exit_code == 2, (done.output, done.exception)
     return " ".join(done.output.partition("error: ")[2].split())

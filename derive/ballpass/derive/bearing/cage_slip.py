@@ -14,6 +14,7 @@ import sympy as sp
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Coordinate, Input
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,11 +68,10 @@ def lag_of(bearing: Bearing, names: Names, rolling: sp.Expr) -> Lag | None:
     constants = _at_rows(bearing, names, symbol_of(bearing.cage.lag), rolling, "rad")
     of = f" of {bearing.name}" if bearing.name else ""
     words = f"Angle by which the cage{of} lags at the reference time"
+    faster = f"Rate at which the cage{of} lags"
     inputs = (
         _table(bearing, names, "table", "cage.lag", "rad", words, r"\lambda"),
-        _table(
-            bearing, names, "table_rate", "cage.lag_rate", "rad/s", f"Rate at which the cage{of} lags", r"\dot\lambda"
-        ),
+        _table(bearing, names, "table_rate", CAGE_LAG_RATE, "rad/s", faster, r"\dot\lambda"),
     )
     value, rate = (one.symbol for one in inputs)
     return Lag(angle=value + rate * TIME, rate=rate, inputs=inputs, constants=constants)
@@ -95,7 +95,7 @@ def lag_state(bearing: Bearing, names: Names) -> LagState | None:
             description=f"angle by which the cage{of} lags",
             group=f"{names.path}.cage",
         ),
-        excess=_table(bearing, names, "table_rate", "cage.excess_slip", "1", words, r"\Delta s_c"),
+        excess=_table(bearing, names, "table_rate", CAGE_EXCESS_SLIP, "1", words, r"\Delta s_c"),
         constants=_at_rows(bearing, names, sp.S.Zero, sp.S.One, "s"),
     )
 

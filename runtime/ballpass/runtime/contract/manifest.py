@@ -19,6 +19,9 @@ FILE_NAME = "manifest.json"
 #: Name of the input that holds the slope of a driver's table of speed over time.
 DRIVER_ACCELERATION = "driver.acceleration"
 
+#: Inputs of a cage whose slip changes over time: where its lag follows from time alone, and where it is a state.
+CAGE_LAG_RATE, CAGE_EXCESS_SLIP = "cage.lag_rate", "cage.excess_slip"
+
 DIGEST = "digest"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.

@@ -39,7 +39,7 @@ class Option:
     reader : of a record, which the command line takes as text
     names : where its texts name something of a model: raises `RequestError` for what the manifest does not have, and
         without a manifest for what no scene has; called with the manifest or None, the parameter's name, the texts
-    behind_scene : whether it stands behind the scene on the command line, without a flag
+    positional : whether it stands by its place on the command line, without a flag
     """
 
     words: str
@@ -53,11 +53,11 @@ class Option:
     choices: tuple[str, ...] = ()
     reader: Callable[[str], Any] | None = None
     names: Callable[[Manifest | None, str, Sequence[str]], object] | None = None
-    behind_scene: bool = False
+    positional: bool = False
 
     def flag(self, name: str) -> str:
         """Flag of a parameter on the command line; its placeholder where it has none."""
-        if self.behind_scene:
+        if self.positional:
             return self.shown or name
         return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
 

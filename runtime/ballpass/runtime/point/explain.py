@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE, DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS
@@ -41,9 +41,6 @@ MANY_OSCILLATIONS = 5000.0
 
 #: Breakpoints that are named one by one; of more, the table of a load has most.
 MOST_NAMED = 12
-
-#: Inputs of a cage whose slip changes end with one of these.
-CAGE = ("cage.lag_rate", "cage.excess_slip")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -283,7 +280,7 @@ def _knot(slope: str) -> str:
     """Words for a knot of the table whose slope is this input, as ``force.punch_slope`` or ``load.x_rate``."""
     if slope == DRIVER_ACCELERATION:
         return "row of the driver's table"
-    if slope.endswith(CAGE):
+    if slope.endswith((CAGE_LAG_RATE, CAGE_EXCESS_SLIP)):
         return "row of the cage's slip"
     kind, _, name = slope.rpartition("_")[0].partition(".")
     return f"knot of {'the load' if kind == 'load' else name}"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import BearingInfo, Manifest
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE, BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
@@ -190,7 +190,7 @@ def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
     """
     values, times = view.numbers.values, view.nodes.t
     for item in view.manifest.inputs:
-        if item.name in (f"{bearing.prefix}cage.lag_rate", f"{bearing.prefix}cage.excess_slip"):
+        if item.name in (bearing.prefix + CAGE_LAG_RATE, bearing.prefix + CAGE_EXCESS_SLIP):
             rows = np.searchsorted([values[name] for name in item.times], times, side="right")
             slopes = np.zeros((len(times), view.directions))
             for row in np.unique(rows).tolist():
@@ -198,7 +198,7 @@ def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
                 for _, name, amount in driver_angle.input_derivatives([item], values, float(times[here][0])):
                     slopes[here] += amount * view.slopes(name)
             mean, slope = view.mean(driver_angle.inputs_over([item], values, times, times)[:, 0], slopes)
-            if item.name.endswith("lag_rate"):
+            if item.name.endswith(CAGE_LAG_RATE):
                 return mean, slope
             turns, turning = f"{bearing.path}.rolling_turns", driver_angle.speed_name(view.manifest)
             assert turning is not None  # of a linkage

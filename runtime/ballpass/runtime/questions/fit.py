@@ -36,7 +36,7 @@ Data = Annotated[
     Option(
         words="Files of measured signals, spectra or quantities: CSV or NetCDF, one for each trial.",
         shown="DATA",
-        behind_scene=True,
+        positional=True,
         names=option_names.measured_quantities,
     ),
 ]

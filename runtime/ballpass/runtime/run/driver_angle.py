@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, BearingInfo, InputInfo, Manifest
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, DRIVER_ACCELERATION, BearingInfo, InputInfo, Manifest
 
 TURN = 2.0 * math.pi
 
@@ -121,7 +121,7 @@ def lag_angle(manifest: Manifest, values: Values, bearing: BearingInfo, t: float
     """Angle by which a cage lags whose lag is a state; of rings that turn with the driver, without swing [rad]."""
     assert manifest.mechanism is not None  # it has the driver
     lag = manifest.initial[[info.name for info in manifest.states].index(f"{bearing.prefix}cage.lag")]
-    (item,) = (item for item in manifest.inputs if item.name == f"{bearing.prefix}cage.excess_slip")
+    (item,) = (item for item in manifest.inputs if item.name == bearing.prefix + CAGE_EXCESS_SLIP)
     times, heights = _knots(item, values)
     edges = np.concatenate([times[:1], times[1:][times[1:] < t], [t]])
     if manifest.mechanism.angle:

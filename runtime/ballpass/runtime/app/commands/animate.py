@@ -8,8 +8,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-import typer
-
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
@@ -41,13 +39,15 @@ def animate(
     ] = "html",
     last: Annotated[
         float,
-        typer.Option(
-            metavar="N", help="Turns to show, the last ones of the run. Where nothing rotates, the whole run is shown."
+        Option(
+            words="Turns to show, the last ones of the run. Where nothing rotates, the whole run is shown.",
+            shown="N",
+            above=0.0,
         ),
     ] = 1.0,
     bearing: Shown = None,
     pictures: Annotated[
-        int | None, typer.Option(metavar="N", help="Pictures of a movie, 12 a second; 72 a turn if not given.")
+        int | None, Option(words="Pictures of a movie, 12 a second; 72 a turn if not given.", shown="N", least=2)
     ] = None,
     set_: options.Settings = None,
     cycles: Cycles = None,

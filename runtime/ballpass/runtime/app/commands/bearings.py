@@ -5,17 +5,16 @@ from __future__ import annotations
 from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
-import typer
-
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import command, show_json, show_parts
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.options import Option
 from ballpass.runtime.report.report import ReportTable
 
 
 def bearings(
     pattern: Annotated[
-        str, typer.Argument(metavar="PATTERN", help="Designations wanted: 6204, 63*, 61?/*.", show_default=False)
+        str, Option(shown="PATTERN", words="Designations wanted: 6204, 63*, 61?/*.", positional=True)
     ] = "*",
     json_: options.Json = False,
 ) -> None:

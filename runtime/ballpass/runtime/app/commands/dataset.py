@@ -13,6 +13,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import Stages, check_folder, command, complain, show, show_json, warn
+from ballpass.runtime.contract.options import Option
 
 if TYPE_CHECKING:
     from ballpass.runtime.app.commands.data_set_spec import ClassSpec
@@ -26,15 +27,15 @@ NAMED = 5
 def dataset(
     spec: Annotated[
         Path,
-        typer.Argument(
-            metavar="SPEC",
-            help="What the data set is made of (TOML); `ballpass new bearing-faults` copies one.",
-            show_default=False,
+        Option(
+            shown="SPEC",
+            words="What the data set is made of (TOML); `ballpass new bearing-faults` copies one.",
+            positional=True,
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="Zarr folder, or NetCDF file NAME.nc; `results/<spec>.zarr` if not given."),
+        Option(shown="PATH", words="Zarr folder, or NetCDF file NAME.nc; `results/<spec>.zarr` if not given."),
     ] = None,
     scheduler: options.Scheduler = None,
     workers: options.Workers = None,

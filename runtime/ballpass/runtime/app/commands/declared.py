@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperArgument, TyperCommand, TyperOption
+from typer.core import TyperArgument, TyperCommand
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
@@ -52,9 +52,9 @@ class Command(TyperCommand):
         except typer.BadParameter as fault:
             missing = fault.param
             # what is missing has no message yet
-            if not isinstance(missing, (TyperArgument, TyperOption)) or fault.message:
+            if not isinstance(missing, TyperArgument) or fault.message:
                 raise
-            name = missing.metavar if isinstance(missing, TyperArgument) else missing.opts[0]
+            name = missing.metavar
             words = missing.help or ""
             wanted = " ".join(str(each.metavar) for each in self.params if isinstance(each, TyperArgument))
             complain(
@@ -162,7 +162,7 @@ def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> in
         kind = list[str] if required else list[str] | None
     elif option.unit or option.reader:
         kind = str if required else str | None
-    if option.behind_scene:
+    if option.positional:
         argument = typer.Argument(metavar=option.shown, help=option.words, show_default=False)
         return parameter.replace(annotation=Annotated[kind, argument])
     flags = option.flags or (option.flag(parameter.name),)

@@ -10,15 +10,14 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import command, complain, warn_of_scene
 from ballpass.runtime.contract.folder import read_manifest
+from ballpass.runtime.contract.options import Option
 
 
 def derive(
     scene: options.SceneFile,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to write; `generated/<scene>` if not given.")
-    ] = None,
+    out: Annotated[Path | None, Option(shown="DIR", words="Folder to write; `generated/<scene>` if not given.")] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; exit code 1 if the folder differs from a new derivation.")
+        bool, Option(words="Write nothing; exit code 1 if the folder differs from a new derivation.")
     ] = False,
 ) -> None:
     """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""

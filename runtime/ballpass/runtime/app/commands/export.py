@@ -29,31 +29,26 @@ from ballpass.runtime.app.commands.shared import (
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.options import Option
 from ballpass.runtime.export.model_description import SPEED
 
 
 def export(
     scene: options.SceneOrFolder,
-    c: Annotated[
-        bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
-    ] = False,
-    fmu: Annotated[
-        bool, typer.Option("--fmu", help="An FMU 3.0 for co-simulation, compiled for this machine.")
-    ] = False,
+    c: Annotated[bool, Option(words="A C99 program with the model, the stepper, a Makefile and a main.")] = False,
+    fmu: Annotated[bool, Option(words="An FMU 3.0 for co-simulation, compiled for this machine.")] = False,
     inputs: Annotated[
         list[str] | None,
-        typer.Option(
-            "--input",
-            metavar="NAME",
-            help="A load, force, torque or speed that is an input of the FMU, by its parameter name or the beginning "
+        Option(
+            shown="NAME",
+            words="A load, force, torque or speed that is an input of the FMU, by its parameter name or the beginning "
             "of it. May be repeated.",
+            flags=("--input",),
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="PATH", help="Folder or FMU to write; `export/<scene>`, `export/<scene>.fmu` if not given."
-        ),
+        Option(shown="PATH", words="Folder or FMU to write; `export/<scene>`, `export/<scene>.fmu` if not given."),
     ] = None,
 ) -> None:
     """Write a scene as a program in C or as an FMU, which run without Python."""

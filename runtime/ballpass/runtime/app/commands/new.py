@@ -11,6 +11,7 @@ import typer
 from ballpass.runtime.app.commands.shared import command, note, show
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.contract.options import Option
 from ballpass.runtime.contract.parameters import unknown_name
 
 
@@ -34,11 +35,9 @@ def new(
         ),
     ] = None,
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder to copy it to; made if it does not exist.")
+        Path, Option(shown="DIR", words="Folder to copy it to; made if it does not exist.", positional=True)
     ] = Path(),
-    list_: Annotated[
-        bool, typer.Option("--list", help="Print names and titles of all scenes; so without NAME.")
-    ] = False,
+    list_: Annotated[bool, Option(words="Print names and titles of all scenes; so without NAME.")] = False,
 ) -> None:
     """Copy a scene or a data set that comes with ballpass into a folder. An existing file is not overwritten."""
     with command():

@@ -6,62 +6,59 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.plot import FORMATS
 
 SceneFile = Annotated[
-    Path, typer.Argument(metavar="SCENE", help="Scene file (TOML); `ballpass new` copies one.", show_default=False)
+    Path, Option(shown="SCENE", words="Scene file (TOML); `ballpass new` copies one.", positional=True)
 ]
 
 #: Of commands that need only the generated folder.
 SceneOrFolder = Annotated[
     Path,
-    typer.Argument(
-        metavar="SCENE",
-        help="Scene file (TOML), which `ballpass new` copies, or a generated folder in its place.",
-        show_default=False,
+    Option(
+        shown="SCENE",
+        words="Scene file (TOML), which `ballpass new` copies, or a generated folder in its place.",
+        positional=True,
     ),
 ]
 
 #: Of questions that also take a finished run.
 SceneFolderOrRun = Annotated[
     Path,
-    typer.Argument(
-        metavar="SCENE",
-        help="Scene file (TOML), which `ballpass new` copies, or the solution.nc of a run, or what ballpass stream "
+    Option(
+        shown="SCENE",
+        words="Scene file (TOML), which `ballpass new` copies, or the solution.nc of a run, or what ballpass stream "
         "wrote.",
-        show_default=False,
+        positional=True,
     ),
 ]
 
 Settings = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="PATH=VALUE",
-        help='Another value for a number of the scene: `--set bearing.clearance="20 um"`. May be repeated.',
+    Option(
+        shown="PATH=VALUE",
+        words='Another value for a number of the scene: `--set bearing.clearance="20 um"`. May be repeated.',
     ),
 ]
 
 ResultsFolder = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder of the results; `results/<scene>` if not given.")
+    Path | None, Option(shown="DIR", words="Folder of the results; `results/<scene>` if not given.")
 ]
 
 #: Of commands that write one file.
 ResultsFile = Annotated[
     Path | None,
-    typer.Option(metavar="PATH", help="File to write, or its folder; `results/<scene>` if not given."),
+    Option(shown="PATH", words="File to write, or its folder; `results/<scene>` if not given."),
 ]
 
 ReportFolder = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder for report and figures; none are written if not given.")
+    Path | None, Option(shown="DIR", words="Folder for report and figures; none are written if not given.")
 ]
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout, nothing else.")]
+Json = Annotated[bool, Option(words="Print the result as one JSON object on stdout, nothing else.")]
 
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
+Figures = Annotated[bool, Option(words="Draw the figures.", flags=("--figures/--no-figures",))]
 
 FigureFormats = Annotated[
     Sequence[str] | None,
@@ -75,7 +72,7 @@ FigureFormats = Annotated[
 
 Scheduler = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler: `tcp://192.168.0.10:8786`."),
+    Option(shown="ADDRESS", words="Run on the workers of this Dask scheduler: `tcp://192.168.0.10:8786`."),
 ]
 
-Workers = Annotated[int | None, typer.Option(metavar="N", help="Run on N processes of a Dask cluster on this machine.")]
+Workers = Annotated[int | None, Option(shown="N", words="Run on N processes of a Dask cluster on this machine.")]

@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-import typer
-
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import (
@@ -106,9 +104,9 @@ def run(
     sample_rate: SampleRate = None,
     initial: Annotated[
         str | None,
-        typer.Option(
-            metavar="START",
-            help="`equilibrium`: the rings start at rest under the load of t = 0; or the solution.nc of another run, "
+        Option(
+            shown="START",
+            words="`equilibrium`: the rings start at rest under the load of t = 0; or the solution.nc of another run, "
             "which continues, and its transient counts from that one's start. Default: as in the scene.",
         ),
     ] = None,
@@ -126,9 +124,7 @@ def run(
         ),
     ] = None,
     of: Of = None,
-    all_: Annotated[
-        bool, typer.Option("--all", help="All rows of the summary, with the names of the numbers.")
-    ] = False,
+    all_: Annotated[bool, Option(words="All rows of the summary, with the names of the numbers.")] = False,
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,

@@ -9,11 +9,12 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands.shared import command
+from ballpass.runtime.contract.options import Option
 
 
 def schema(
     file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="File to write; stdout without one.", show_default=False)
+        Path | None, Option(shown="FILE", words="File to write; stdout without one.", positional=True)
     ] = None,
 ) -> None:
     """Print a JSON Schema of scene files, by which editors complete and check them."""

@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, show
@@ -27,7 +25,7 @@ Of = Annotated[
 
 def stream(
     scene: options.SceneOrFolder,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="NetCDF-4 file to write.")],
+    out: Annotated[Path, Option(shown="FILE", words="File to write, NetCDF-4.")],
     sample_rate: Annotated[float, Option(words="Samples a second.", example='"51.2 kHz"', shown="RATE", unit="Hz")],
     cycles: Cycles = None,
     duration: Duration = None,

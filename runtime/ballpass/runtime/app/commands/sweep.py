@@ -82,9 +82,9 @@ def sweep(
     scene: options.SceneOrFolder,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="PATH=A:B:N",
-            help='N values of a number of the scene from A to B: `--vary bearing.clearance="5 um:40 um:8"`. With '
+        Option(
+            shown="PATH=A:B:N",
+            words='N values of a number of the scene from A to B: `--vary bearing.clearance="5 um:40 um:8"`. With '
             "`:log` after N they are spaced by a factor; `bearing.clearance=CN:8` goes through a group of clearance. "
             "May be repeated: all combinations run, the last one varying fastest.",
         ),
@@ -99,11 +99,10 @@ def sweep(
     kinks: AtKinks = None,
     growth: Annotated[
         bool | None,
-        typer.Option(
-            "--growth/--no-growth",
-            help="Run each member a second time from a start moved by the tolerance, and mark numbers without digits: "
+        Option(
+            words="Run each member a second time from a start moved by the tolerance, and mark numbers without digits: "
             f"`~` in the table. If not given: up to {TWINS} members.",
-            show_default=False,
+            flags=("--growth/--no-growth",),
         ),
     ] = None,
     threads: Annotated[
