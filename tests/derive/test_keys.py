@@ -30,8 +30,10 @@ from ballpass.derive.scene.keys import (
     VectorKey,
     WholeKey,
 )
+from ballpass.derive.scene.quantity import Bounds
 from ballpass.derive.scene.table import Collector, Table
 from ballpass.derive.scene.toml_lines import LineIndex
+from ballpass.derive.scene.units import COMMON, KINDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 VALIDATOR = jsonschema.Draft202012Validator(json_schema())
@@ -156,3 +158,24 @@ def test_key_and_its_schema_refuse_the_same(key: Key, given: object) -> None:
     key.read(table, "x")
     fits = jsonschema.Draft202012Validator(key.schema()).is_valid(given)
     assert fits or table.collector.faults, SimpleNamespace(key=key, given=given)
+
+
+@pytest.mark.parametrize("unit", sorted(KINDS))
+def test_schema_refuses_usual_units_of_another_dimension_and_signs_as_the_reader_does(unit: str) -> None:
+    key = QuantityKey(unit=unit, setting=True, bounds=Bounds(least=0.0))
+    validator = jsonschema.Draft202012Validator(key.schema())
+    for name in ("", *COMMON, unit, "furlong"):
+        for sign in ("", "-"):
+            given = f"{sign}2.5e1 {name}".strip()
+            table = collected({"x": given})
+            key.read(table, "x")
+            fits = validator.is_valid(given)
+            assert fits or table.collector.faults, given
+            if name != "furlong" and (sign or name.isascii()):
+                assert not (fits and table.collector.faults), given
+
+
+def test_schema_requires_the_law_that_decides_about_other_keys() -> None:
+    text = (SCENES / "rotor.toml").read_text(encoding="utf-8")
+    assert refused(text) == []
+    assert refused(text.replace('law = "none"', "")) == ["bearing.damping"]

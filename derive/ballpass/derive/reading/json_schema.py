@@ -78,6 +78,7 @@ def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:
     always = [section for section in own if not section.variant[0]]
     required = [_required(section) for section in always]
     table["required"] = [name for name in (required[0] if required else ()) if all(name in one for one in required)]
+    table["required"] += dict.fromkeys(section.variant[0] for section in own if section.variant[0])
     table["allOf"] = [_rules(section) for section in always if section.either is not None]
     table["allOf"] += [_of_variant(own, value) for value in dict.fromkeys(s.variant for s in own) if value[0]]
     table = {word: value for word, value in table.items() if value or word == "additionalProperties"}

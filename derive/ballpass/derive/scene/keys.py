@@ -18,7 +18,8 @@ from typing import Any, ClassVar, Self
 
 from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, SceneNumber, UsualRange, Vector
 from ballpass.derive.scene.table import Table, listing, suggest
-from ballpass.derive.scene.units import show
+from ballpass.derive.scene.units import COMMON, show
+from ballpass.runtime.contract.units import unit_size
 
 #: Values of placeholders.
 Fill = Mapping[str, str]
@@ -26,6 +27,16 @@ Fill = Mapping[str, str]
 
 #: How a quantity begins, in JSON Schema.
 NUMBER = r"^\s*[-+]?(\d|\.\d)"
+
+
+def _text(unit: str, bounds: Bounds | None = None) -> dict[str, Any]:
+    """Schema of a quantity as a text: a usual unit of another dimension is refused, and a sign beyond the bounds."""
+    base = unit_size(unit).base
+    others = [name for name, size in COMMON.items() if name.isascii() and size.base != base]
+    wrong = rf"{NUMBER}[\d.eE+-]*\s*({'|'.join(others)}){'?' if unit != '1' else ''}\s*$"
+    if bounds is not None and any(end is not None and end >= 0.0 for end in (bounds.above, bounds.least)):
+        wrong += r"|^\s*-[0.]*[1-9]"
+    return {"type": "string", "pattern": NUMBER, "not": {"pattern": wrong}}
 
 
 def filled(text: str, fill: Fill) -> str:
@@ -144,7 +155,7 @@ class QuantityKey(Key):
 
     def schema(self) -> dict[str, Any]:
         """A text with a unit, or a plain number within its bounds."""
-        text: dict[str, Any] = {"type": "string", "pattern": NUMBER}
+        text = _text(self.unit, self.bounds)
         if self.unit != "1":
             return {"anyOf": [text, {"enum": [*self.groups]}]} if self.groups else text
         bounds = self.bounds or Bounds()
@@ -408,13 +419,14 @@ class VectorKey(Key):
 
     def schema(self) -> dict[str, Any]:
         """Its forms."""
-        number = {"type": "string", "pattern": NUMBER}
-        polar = {"properties": dict.fromkeys(self.polar, number), "required": [*self.polar]}
+        number, length = _text(self.unit), _text(self.unit, self.length_limits.bounds)
+        alone = [_text(self.unit, self.axis_limits.bounds)] if self.axis else []
+        polar = {"properties": dict(zip(self.polar, (length, _text("rad")), strict=True)), "required": [*self.polar]}
         forms = [
             {"type": "array", "items": number, "minItems": 2, "maxItems": 2},
             {"type": "object", **polar, "additionalProperties": False},
         ]
-        return {"anyOf": [*([{"const": "origin"}] * self.origin), *([number] * bool(self.axis)), *forms]}
+        return {"anyOf": [*([{"const": "origin"}] * self.origin), *alone, *forms]}
 
     def placeholder(self, table: Table, name: str) -> Vector:
         """Zero."""
