@@ -104,7 +104,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         result->step = run->step;
         return BALLPASS_PAUSED;
     }
-    const int reduced = reduce_step(run, start, t, h, prepared);
+    const int reduced = reduce_step(run, start, t, h, taken->met == CUT, prepared);
     keep_step(run, start, t, h, taken->last ? end : start + (t + h), taken->met == CUT, reduced);
     /* a step that was cut, or has its own pace, does not show which family suits */
     const int chosen = changeable && taken->met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
