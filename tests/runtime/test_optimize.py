@@ -111,6 +111,29 @@ def test_hours_of_a_life_are_turns_at_the_speed_of_the_inner_ring(make_model: Ca
         read_limits(press.manifest, "subject_to", texts, press, None, ["mechanism.driver.speed"])
 
 
+def test_a_candidate_without_a_run_is_none(rotor: Model) -> None:
+    """Above some 100 kN a ball is flattened as in no bearing."""
+    found = rotor.optimize("peak_ball_force", "load.force.x=100 N:10 MN:log", cycles=2, transient=1, starts=1)
+    assert found.bounds == ("first",)
+    assert found.converged
+
+
+@pytest.mark.long
+def test_starts_along_a_curved_limit_are_apart_and_take_the_corners(make_model: Callable[..., Model]) -> None:
+    """A sweep of 61 by 61 points has 36.27 N, one of 41 by 41 points 42.16; without the corners it was 50.2."""
+    found = make_model("rotor").optimize(
+        "peak_ball_force",
+        ["bearing.clearance=0 um:40 um", "bearing.inner_ring.damping=100 N*s/m:2000 N*s/m"],
+        subject_to="range:inner.y >= 1.2 um",
+        cycles=10,
+        transient=5,
+    )
+    assert found.value < 40.0
+    assert found.limits[0].value == pytest.approx(1.2e-6, rel=1e-4)
+    starts = np.array([start for start, _ in found.starts]) / [40e-6, 1900.0]
+    assert min(np.max(np.abs(starts[j] - starts[k])) for j in range(3) for k in range(j)) >= 0.2
+
+
 @pytest.mark.long
 def test_a_wrong_gradient_is_caught(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
     press = make_model("punching_press")

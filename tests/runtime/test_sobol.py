@@ -75,6 +75,18 @@ def test_wilson_covers_the_share_in_95_percent_of_samples() -> None:
     assert wilson(0, 10)[1] == pytest.approx(0.2775, abs=1e-4)  # a printed table
 
 
+def test_shares_of_the_few_members_that_have_results_are_a_fault(rotor: Model) -> None:
+    """Above some 100 kN a ball is flattened as in no bearing."""
+    load, of = "load.force.x=1 kN:100 MN", "rms:inner.y"
+    shares = rotor.sobol(load, of, cycles=2, transient=1, samples=64, progress=False)
+    effects = rotor.morris(load, of, cycles=2, transient=1, base=16, progress=False)
+    screened = rotor.morris("load.force.x=1 kN:1 MN:log", of, cycles=2, transient=1, base=16, progress=False)
+    for found, ends in ((shares, True), (effects, True), (screened, False)):
+        assert found.failed > 0.05 * found.members
+        assert bool(found.report().fault) == ends
+    assert rotor.sobol(load, of, cycles=2, transient=1, samples=64, indices=False, progress=False).failed in (63, 64)
+
+
 @pytest.mark.long
 def test_failed_members_of_a_scene_leave_the_shares_as_they_are(make_model: Callable[..., Model]) -> None:
     """The crank's inertia acts nowhere; one in twenty is drawn below zero, which is refused."""

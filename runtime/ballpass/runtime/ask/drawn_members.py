@@ -56,6 +56,22 @@ def words_of(one: Distribution) -> str:
     return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"
 
 
+def fault_of(failed: int, members: int, known: bool) -> str:
+    """What is at fault where members without results leave no number that was asked for; empty if nothing is.
+
+    Parameters
+    ----------
+    known : whether each input has numbers
+    """
+    if failed == members:
+        return "No member has a result."
+    if failed and not known:
+        return (
+            f"{failed} of {members} members have no result: too few are left to compare. Give narrower distributions."
+        )
+    return ""
+
+
 def values_of(inputs: Mapping[str, Distribution], shares: np.ndarray) -> np.ndarray:
     """Values of the inputs from shares of smaller ones, shape (members, inputs)."""
     return np.stack([one.values(share) for one, share in zip(inputs.values(), shares.T, strict=True)], axis=1)

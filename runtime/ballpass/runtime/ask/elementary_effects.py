@@ -29,7 +29,7 @@ class ElementaryEffect:
     size, size_low, size_high : mean of the changes without their signs, and 95 % interval
     mean : of the changes
     deviation : of the changes among base members; zero for an input that acts linearly and by itself
-    rows : pairs of members that both had results
+    rows : pairs of members that both had results; with fewer than two the rest is NaN
 
     Examples
     --------
@@ -68,9 +68,9 @@ def elementary_effects(shares: np.ndarray, base: np.ndarray, other: np.ndarray, 
     for column, one in zip(shares.T, other, strict=True):
         changes = (one - base) / ((column + STEP) % 1.0 - column)
         changes = changes[np.isfinite(changes)]
-        if not len(changes):
-            nan = math.nan
-            found.append(ElementaryEffect(size=nan, size_low=nan, size_high=nan, mean=nan, deviation=nan, rows=0))
+        if len(changes) < 2:
+            nan, rows = math.nan, len(changes)
+            found.append(ElementaryEffect(size=nan, size_low=nan, size_high=nan, mean=nan, deviation=nan, rows=rows))
             continue
         again = np.mean(random.choice(np.abs(changes), (RESAMPLES, len(changes))), axis=1)
         low, high = np.percentile(again, (2.5, 97.5)).tolist()

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest
 
-#: Resamples of a bootstrap.
-RESAMPLES = 500
+#: Resamples of a bootstrap, and fewest rows that have shares: half of the fewest base samples.
+RESAMPLES, FEWEST = 500, 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class VarianceShare:
     ----------
     first, first_low, first_high : what the variance would lose on average if the input were known, and 95 % interval
     total, total_low, total_high : what is left of it if all others were known
-    rows : base members of which all three needed members had results
+    rows : base members of which all three needed members had results; with fewer than `FEWEST` the rest is NaN
 
     Examples
     --------
@@ -62,7 +62,7 @@ def variance_shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray, seed: int) 
     for one in mixed:
         known = np.isfinite(a) & np.isfinite(b) & np.isfinite(one)
         rows = int(np.count_nonzero(known))
-        if rows < 2:
+        if rows < FEWEST:
             found.append(VarianceShare(**dict.fromkeys(_NUMBERS, math.nan), rows=rows))
             continue
         parts = np.stack([a[known], b[known], one[known]])

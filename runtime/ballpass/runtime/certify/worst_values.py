@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.stats.qmc import Halton
@@ -61,19 +62,17 @@ class WorstValues:
         self._goal, self._limits, self._vary, self._box = goal, limits, vary, box
         names = list(dict.fromkeys([goal, *(one.quantity for one in limits)]))
         self._names = list(dict.fromkeys(one.name for one in (*vary, *box)))
-        self._lanes, self._exact = (
-            QuantityFunction(
-                model,
-                names,
-                self._names,
-                cycles,
-                transient=transient,
-                parameters=parameters,
-                rtol=OPTIMUM_RTOL,
-                kinks=kinks,
-            )
-            for kinks in (None, "located")
+        function = partial(
+            QuantityFunction,
+            model,
+            names,
+            self._names,
+            cycles,
+            transient=transient,
+            parameters=parameters,
+            rtol=OPTIMUM_RTOL,
         )
+        self._lanes, self._tried, self._exact = function(), function(failed="nan"), function(kinks="located")
         self._columns = [0, *(names.index(one.quantity) for one in limits)]
         self._signs = np.array([1.0, *(one.sign for one in limits)])
         self._offsets = np.array([0.0, *(one.limit for one in limits)])
@@ -82,15 +81,25 @@ class WorstValues:
         self.sizes = np.ones(len(self._columns))
 
     def candidates(self, shares: np.ndarray, parts: KeptParts) -> np.ndarray:
-        """Merits of points, which also give the sizes, shape (points,)."""
-        (found,) = parts.once(shares, lambda: (self._lanes(np.array([self._rows(share) for share in shares])),))
+        """Merits of points, which also give the sizes, shape (points,); infinite where a run fails.
+
+        Raises
+        ------
+        SimulationError
+            All runs failed.
+        """
+        (found,) = parts.once(shares, lambda: (self._tried(np.array([self._rows(share) for share in shares])),))
+        known = np.isfinite(found).all(axis=(1, 2))
+        if not known.any():
+            self._lanes(self._rows(shares[0]))  # fails, and says why
         scaled = self._signs * (found[..., self._columns] - self._offsets)
-        seen = np.median(np.abs(found[..., self._columns]), axis=(0, 1))
+        seen = np.median(np.abs(found[known][..., self._columns]), axis=(0, 1))
         # a limit of zero has no size of its own
         limits = (abs(one.limit) or size for one, size in zip(self._limits, seen[1:].tolist(), strict=True))
         self.sizes = np.maximum([seen[0], *limits], 1e-300)
         worst = (scaled / self.sizes).max(axis=1)
-        return np.array([Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, worst, strict=True)])
+        merits = [Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, worst, strict=True)]
+        return np.where(known, merits, np.inf)
 
     def plane(self, share: np.ndarray, parts: KeptParts) -> Plane:
         """Values and exact slopes at a point."""

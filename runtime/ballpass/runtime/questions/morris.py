@@ -84,6 +84,9 @@ class MorrisAnswer(ShortRepr, Reported):
     fault: str
 
     def _report(self) -> Report:
+        from ballpass.runtime.ask.drawn_members import fault_of
+
+        known = all(effect.rows >= 2 for one in self.quantities for effect in one.effects)
         parts, records = [], []
         for one in self.quantities:
             ranked = sorted(zip(self.inputs, one.effects, strict=True), key=lambda pair: -pair[1].size)
@@ -121,7 +124,7 @@ class MorrisAnswer(ShortRepr, Reported):
             records=records,
             index=("quantity", "input"),
             warnings=warned,
-            fault="" if self.failed < self.members else "No member has a result.",
+            fault=fault_of(self.failed, self.members, known),
         )
 
 

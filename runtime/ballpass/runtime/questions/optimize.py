@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,11 +28,14 @@ if TYPE_CHECKING:
     from ballpass.runtime.ask.limits import Limit
     from ballpass.runtime.ask.parameter_range import ParameterRange
 
-#: Candidates of which each start is the best; they run in lanes.
+#: Candidates for each start beside the corners of the ranges; they run in lanes.
 CANDIDATES = 8
 
-#: Most tolerances: the corners of their box are all taken.
+#: Most tolerances: the corners of their box are all taken.  Of more ranges no corners are candidates.
 MOST_TOLERANCES = 6
+
+#: Starts are so far apart in one parameter or more, as a share of its range, where there are such [1].
+APART = 0.2
 
 #: A further point that is worse by more is warned of, as a share of the goal [1].
 WORSE = 1e-3
@@ -77,7 +81,15 @@ Search = Annotated[
         "planes from where it ends."
     ),
 ]
-Starts = Annotated[int, Option(words="Starts, each the best of eight candidates.", shown="N", least=1, most=100)]
+Starts = Annotated[
+    int,
+    Option(
+        words="Starts: the best candidates that are apart, of eight for each and the corners of the bounds.",
+        shown="N",
+        least=1,
+        most=100,
+    ),
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -289,6 +301,7 @@ def optimize(
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
+    from ballpass.runtime.certify.quantity_function import UnknownValueWarning
     from ballpass.runtime.certify.worst_values import WorstValues
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
@@ -304,7 +317,10 @@ def optimize(
     varied = [one.name for one in (*ranges, *box)]
     limits = read_limits(model.manifest, "subject_to", _texts(subject_to), model, parameters, varied)
     worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
-    shares = Halton(len(ranges), scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
+    count = len(ranges)
+    shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
+    if count <= MOST_TOLERANCES:
+        shares = np.concatenate([shares, list(itertools.product((0.0, 1.0), repeat=count))])
     minimized = {"planes": minimize_by_planes, "slsqp": minimize_by_slsqp, "ipopt": minimize_by_ipopt}[search]
     with (
         kept_parts(keep, model, *worst.decides) as parts,
@@ -312,13 +328,12 @@ def optimize(
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
-        merits = worst.candidates(shares, parts)
+        warnings.simplefilter("ignore", UnknownValueWarning)  # a candidate without values is none
         found = []
-        for block in range(starts):
-            at = CANDIDATES * block + int(np.argmin(merits[CANDIDATES * block : CANDIDATES * (block + 1)]))
-            found.append((shares[at], minimized(lambda share: worst.plane(share, parts), shares[at])))
+        for start in _apart(shares[np.argsort(worst.candidates(shares, parts), kind="stable")], starts):
+            found.append((start, minimized(lambda share: worst.plane(share, parts), start)))
             if tell is not None:
-                tell((block + 1) / (starts + 1))
+                tell(len(found) / (starts + 1))
         least = min((one for _, one in found), key=lambda one: one.best.merit)
         best, sizes = least.best, worst.sizes
         verdicts = worst.verdicts(least)
@@ -354,6 +369,16 @@ def optimize(
         nominal=nominal,
         further=further,
     )
+
+
+def _apart(points: np.ndarray, count: int) -> np.ndarray:
+    """The first points of which none is near another one, and the first others where there are too few."""
+    chosen: list[int] = []
+    for k, point in enumerate(points):
+        if len(chosen) < count and all(np.max(np.abs(point - points[other])) >= APART for other in chosen):
+            chosen.append(k)
+    others = [k for k in range(len(points)) if k not in chosen]
+    return points[[*chosen, *others][:count]]
 
 
 def _texts(given: str | Sequence[str] | None) -> list[str]:

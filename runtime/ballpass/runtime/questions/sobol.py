@@ -150,7 +150,8 @@ class SobolAnswer(ShortRepr, Reported):
     values: np.ndarray
 
     def _report(self) -> Report:
-        from ballpass.runtime.ask.variance_shares import wilson
+        from ballpass.runtime.ask.drawn_members import fault_of
+        from ballpass.runtime.ask.variance_shares import FEWEST, wilson
 
         parts: list[Any] = []
         rows = []
@@ -198,14 +199,14 @@ class SobolAnswer(ShortRepr, Reported):
             **self._named("samples", "seed", "members", "failed"),
             "first_fault": self.fault,
         }
-        fault = "" if self.failed < self.members else "No member has a result."
+        known = all(share.rows >= FEWEST for one in self.quantities for share in one.shares)
         return Report(
             parts=tuple(parts),
             facts=facts,
             records=records,
             index=("quantity", "input"),
             warnings=warned,
-            fault=fault,
+            fault=fault_of(self.failed, self.members, known),
         )
 
 
