@@ -157,10 +157,10 @@ def strobe_with_tangents(
     return states[ALIGN:], flows
 
 
-def period_of(states: np.ndarray, magnitude: np.ndarray) -> int:
-    """Readings after which states are there again; 0 where that is more than `LONGEST`."""
+def period_of(states: np.ndarray, magnitude: np.ndarray, longest: int = LONGEST) -> int:
+    """Readings after which states are there again; 0 where they are more than `longest`."""
     shares = states / magnitude
-    for period in range(1, min(LONGEST, len(shares) // 2) + 1):
+    for period in range(1, min(longest, len(shares) // 2) + 1):
         if np.max(np.abs(shares[period:] - shares[:-period])) < REPEATED:
             return period
     return 0

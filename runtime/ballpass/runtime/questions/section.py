@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 #: press at a loaded angle comes as near as 0.08 [1].
 ON_CURVE = 0.02
 
+#: Most points that repeat and are not a curve: the 134 of the paper's press lie on one.
+FEW = 16
+
 #: Rounds of a curve, and moments at which what turns is sought.
 PITCH, CAGE, MOMENTS = "ball pitch", "turn of the cage", 40
 
@@ -259,7 +262,7 @@ def section(
             transient=0.0,
             progress=False,
         )
-    period = turns * period_of(run.x, np.array(run.statistics.magnitudes))
+    period = turns * period_of(run.x, np.array(run.statistics.magnitudes), FEW)
     phase, around, curve = np.zeros(readings), bearing_words(PITCH, manifest.bearings), None
     others: tuple[str, ...] = ()
     if len(manifest.bearings) == 1:
