@@ -60,6 +60,21 @@ def test_multipliers_are_those_of_differences_of_a_tight_flow(rotor: Model) -> N
         assert np.min(np.abs(differences - m)) < 1e-6
 
 
+@pytest.mark.parametrize("hertz", [20.0, 600.0])
+def test_the_transient_that_comes_as_near_takes_more_than_ten_times_the_periods(rotor: Model, hertz: float) -> None:
+    """Side by side: a run of the printed number of periods is as near to the state, and one of half as many is not."""
+    given = {"shaft.speed": 393.1540342298 * RPM * hertz / 20.0}
+    found = rotor.steady(parameters=given)
+    words = str(found).replace("\n", " ").partition("a transient takes ")[2]
+    periods = int(words.partition(" periods")[0])
+    assert periods > 10 * found.integrated
+    times = np.array([periods // 2, periods]) * found.period
+    run = rotor.simulate(duration=times[-1], times=times, parameters=given, rtol=1e-11, outputs=[], transient=0.0)
+    half, whole = np.max(np.abs(run.x - found.start) / run.statistics.magnitudes, axis=1)
+    assert found.left[-1] < 1e-11
+    assert whole < 5e-11 < 1e-7 < half
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("law", ["one-sided-gated", "two-sided-gated"])
 def test_multipliers_of_a_law_that_jumps_are_those_of_differences_of_a_tight_flow(

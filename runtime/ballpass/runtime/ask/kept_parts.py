@@ -68,12 +68,13 @@ def kept_parts(folder: str | Path | None, model: LoadedModel, *decides: Any) -> 
     folder : None to keep nothing
     decides : what decides the results beside the model: arrays, and what has a faithful `repr`
     """
-    place = None if folder is None else Path(folder)
-    if place is not None:
-        place.mkdir(parents=True, exist_ok=True)
+    if folder is None:
+        yield KeptParts(None, ())
+        return
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
     yield KeptParts(place, (__version__, asdict(model.manifest), *decides))
-    if place is not None:
-        shutil.rmtree(place)
+    shutil.rmtree(place)
 
 
 def _digest(parts: tuple[Any, ...]) -> str:
