@@ -183,6 +183,15 @@ def test_a_second_run_gives_the_same_numbers(site: Site, ballpass: Callable[...,
     assert again == first
 
 
+def test_numbers_that_are_not_finite_are_null(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
+    """No ball carries a load: the life has no end, and a traceback of JSON was all that came of it."""
+    free = ("--set", "load.force.x=0 N", "--set", "bearing.clearance=40 um", "--cycles", "2", "--transient", "1")
+    scene = SCENES / "varying_compliance.toml"
+    result = ballpass(tmp_path, "run", scene, *free, "--of", "life", "--json", "--no-figures")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["quantities"]["life"]["value"] is None
+
+
 def test_without_json_a_table_and_the_place_of_the_results_are_printed(
     site: Site, ballpass: Callable[..., Result], tmp_path: Path
 ) -> None:

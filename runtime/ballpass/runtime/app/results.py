@@ -18,6 +18,7 @@ from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import file_digest
 from ballpass.runtime.contract.folders import read_whole, replace_files
+from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.solution_file import read_bytes
 from ballpass.runtime.show.short import ShortRepr
@@ -71,7 +72,7 @@ def write_results(
     def write_all(made: Path) -> dict[str, Any]:
         summary = write(made)
         summary[FILES] = {path.name: file_digest(path) for path in sorted(made.iterdir())}
-        (made / SUMMARY).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        (made / SUMMARY).write_text(json_text(summary), encoding="utf-8")
         return summary
 
     summary = replace_files(folder, write_all, last=SUMMARY, owned=lambda: figures)

@@ -20,8 +20,8 @@ def to_plain(report: Report) -> dict[str, Any]:
 
 
 def json_text(plain: Any) -> str:
-    """Plain data as indented JSON."""
-    return json.dumps(plain, indent=2, allow_nan=False) + "\n"
+    """Plain data as indented JSON; numbers that are not finite are null."""
+    return json.dumps(finite(plain), indent=2, allow_nan=False) + "\n"
 
 
 def to_pandas(report: Report) -> pandas.DataFrame:
