@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -215,6 +216,22 @@ def test_a_set_whose_description_is_cut_is_refused_by_name(rotor: Model, tmp_pat
     (path / name).write_bytes((path / name).read_bytes()[:3])
     with pytest.raises(RequestError, match=r"set\.zarr: what describes the data set .* cannot be read"):
         make_data_set(path, classes(rotor, 1), SIGNALS, seed=5)
+
+
+@pytest.mark.parametrize("name", ["time/.zattrs", "status/.zarray"])
+def test_a_description_of_an_array_that_is_cut_or_deleted_is_written_again(
+    rotor: Model, tmp_path: Path, name: str
+) -> None:
+    """Readers that take no consolidated description failed on a set that counted as complete."""
+    path = tmp_path / "set.zarr"
+    make_data_set(path, classes(rotor, 1), SIGNALS, seed=5)
+    content = (path / name).read_bytes()
+    for rest in (None, b"", content[:-3]):
+        (path / name).unlink()
+        if rest is not None:
+            (path / name).write_bytes(rest)
+        assert make_data_set(path, classes(rotor, 1), SIGNALS, seed=5).made == 0
+        assert json.loads((path / name).read_text(encoding="utf-8")) == json.loads(content)
 
 
 def test_a_set_that_fits_nowhere_is_refused_and_leaves_nothing(rotor: Model, tmp_path: Path) -> None:

@@ -196,11 +196,14 @@ def mend(group: Any, axes: SignalAxes) -> None:
 
     A file of samples counts by its length, which is known because samples are not compressed.
     """
+    folder = Path(group.store.root)
+    for name, facts in json.loads((folder / ".zmetadata").read_text(encoding="utf-8"))["metadata"].items():
+        if "/" in name and not _is_json(folder / name):
+            (folder / name).write_text(json.dumps(facts, indent=2), encoding="utf-8")
     for name, _, values, _, _ in _known_arrays(axes):
         found = _readable(group, name)
         if found is None or not np.array_equal(found, values, equal_nan=values.dtype.kind == "f"):
             group[name][:] = values
-    folder = Path(group.store.root)
     quantities = ["quantities"] if axes.quantities else []
     entries = [f"entry_time.{name}" for name in axes.driven]
     names = [*(name for name, _, _ in axes.outputs), *quantities, *entries, "noise_rms", "failure", "status"]
@@ -211,6 +214,15 @@ def mend(group: Any, axes: SignalAxes) -> None:
             for place in places.values():
                 place.unlink(missing_ok=True)
             group["status"][which] = np.full(len(axes.labels[which]), UNFINISHED, np.int8)
+
+
+def _is_json(path: Path) -> bool:
+    """Whether a description of an array is there, and is not cut."""
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 def _readable(group: Any, name: str) -> Any:
