@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import time
 from collections.abc import Callable
@@ -135,6 +136,26 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     assert code == 1
     assert "the motion is chaotic" in said
     assert time.process_time() - began < 3.0  # one on a machine that does nothing else
+
+
+@pytest.mark.long
+def test_scatter_beside_settled_numbers_is_of_the_settled_turns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was that of the scene's two turns: ten times as much, and around another mean."""
+    monkeypatch.chdir(tmp_path)
+    tangent = PRESS.with_name("punching_press_tangent.toml")
+    found = {}
+    for turns in ((), ("--turns", "settle")):
+        done = CliRunner().invoke(
+            app, ["run", str(tangent), "--set", f"{CLEARANCE}=40 um", "--no-figures", "--json", *turns]
+        )
+        found[turns] = json.loads(done.stdout)
+    short, long = found.values()
+    assert long["longer"]["settled"] is True
+    few, many = (one["inner.x"]["over_starts"]["rms"] for one in (short, long))
+    assert many["std"] < 0.3 * few["std"]
+    assert abs(many["mean"] - long["inner.x"]["rms"]) < 10.0 * many["std"]
 
 
 def test_derivatives_of_what_does_not_move_with_the_rings_are_not_refused(press: Model) -> None:

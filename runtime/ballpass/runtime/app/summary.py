@@ -179,8 +179,8 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
                 lines.append((row_place(manifest, row) is None, -change, f"{words} {now} {shown} {than}"))
         if instead:
             summary[entry] |= added[entry]
-            for spread in summary[entry].get("over_starts", {}).values():
-                spread.pop("mean", None)  # of other turns
+            if not longer.settled:
+                summary[entry].pop("over_starts", None)  # of other turns
             for key in numbers.keys() & _BALL_FORCES.keys():
                 summary[entry]["time"][key], summary[entry]["ball"][key] = found.maximum_time, found.maximum_ball
                 summary[entry]["sampled"].pop(key)

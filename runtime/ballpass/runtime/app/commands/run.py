@@ -196,8 +196,6 @@ def run(
                 rtol=solution.statistics.rtol,
                 initial=start,
             )
-            if growth.words:
-                warn(growth.words)
         longer = None
         if turns is not None:
             taken = solution.statistics
@@ -212,6 +210,15 @@ def run(
             )
             if not longer.settled:
                 warn(longer.words)
+            if growth is not None and growth.spread and longer.settled:  # of the turns whose numbers are printed
+                steady = longer.reductions
+                growth = model.growth(
+                    duration=steady.start + steady.duration - taken.begin,
+                    transient=steady.start / model.period(asked.overrides),
+                    parameters=asked.overrides,
+                    rtol=taken.rtol,
+                    initial=start,
+                )
         else:
             longer = look_further(model, model.numbers(asked.overrides), solution)
             if longer is not None:
@@ -220,6 +227,8 @@ def run(
                 length = (cycles, duration, transient)
                 for words in transient_words(model, own, longer, asked=length != (None, None, None)):
                     warn(words)
+        if growth is not None and growth.words:
+            warn(growth.words)
         if chosen:
             for words in tables_left_out(model, model.numbers(asked.overrides).values):
                 warn(words)
