@@ -52,6 +52,15 @@ def press(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return _model(tmp_path_factory.mktemp("run_up"))
 
 
+def test_samples_follow_the_turns_that_pass(press: Model) -> None:
+    """From 60 rpm the 3.6 turns of the run had the samples of 0.9, and of 0.001 rpm two in all."""
+    passed = float(np.trapezoid(np.abs(np.interp(np.linspace(0.0, END, 100_001), TIMES, SPEEDS)), dx=END / 1e5))
+    for first in (SPEEDS[0], 1e-4):
+        run = press.simulate(parameters={"mechanism.driver.table.speed.1": first})
+        assert len(run.t) > 0.9 * 2000 * passed / math.tau
+    assert len(press.simulate(samples_per_cycle=100).t) == pytest.approx(100 * passed / math.tau, rel=0.01)
+
+
 def test_angle_and_acceleration_are_the_integral_and_the_slope_of_the_table(press: Model) -> None:
     times = np.array([0.01, 0.1, 0.31, 0.5, 0.7, 0.85])
     run = press.simulate(times=times, duration=END, rtol=1e-6)

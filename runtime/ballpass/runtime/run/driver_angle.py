@@ -117,6 +117,20 @@ def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, floa
     return angle, speed
 
 
+def turns_passed(manifest: Manifest, values: Values, begin: float, end: float) -> float:
+    """Turns of driver or shaft between two times, in either direction: by its table of speeds, else at one speed."""
+    for item in manifest.inputs:
+        if item.name == DRIVER_ACCELERATION:
+            times, speeds = _knots(item, values)
+            edges = np.concatenate([[begin], times[(times > begin) & (times < end)], [end]])
+            rates = np.interp(edges, times, speeds)
+            one, other = np.abs(rates[:-1]), np.abs(rates[1:])
+            size = np.maximum(one + other, 1e-300)
+            means = 0.5 * np.where(rates[:-1] * rates[1:] < 0.0, (one**2 + other**2) / size, size)
+            return float(means @ np.diff(edges)) / TURN
+    return (end - begin) / period(manifest, values)
+
+
 def lag_angle(manifest: Manifest, values: Values, bearing: BearingInfo, t: float) -> float:
     """Angle by which a cage lags whose lag is a state; of rings that turn with the driver, without swing [rad]."""
     assert manifest.mechanism is not None  # it has the driver

@@ -6,7 +6,7 @@ In: a `Request` and the `Run` made of it.  Out: a `Sampling`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,12 +44,12 @@ class Sampling:
     outputs: tuple[str, ...]
 
 
-def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
+def sampling_of(model: LoadedModel, request: Request, values: Mapping[str, float]) -> Sampling:
     """Check samples and outputs of a request.
 
     Parameters
     ----------
-    turn : time of a turn, infinite where nothing turns [s]
+    values : parameters and derived constants by name
 
     Raises
     ------
@@ -57,16 +57,16 @@ def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
         The request is wrong; the message says what is allowed.
     """
     outputs = output_names(model.manifest, request.outputs)
-    duration, times = _sample_times(model, request, turn, outputs)
+    duration, times = _sample_times(model, request, values, outputs)
     even = request.times is None and request.sample_rate is None
     return Sampling(duration=duration, times=times, even=even, outputs=outputs)
 
 
 def _sample_times(
-    model: LoadedModel, request: Request, turn: float, outputs: Sequence[str]
+    model: LoadedModel, request: Request, values: Mapping[str, float], outputs: Sequence[str]
 ) -> tuple[float, np.ndarray]:
     """Length of the run, and the times of its samples."""
-    begin = start_time(request.initial)
+    begin, turn = start_time(request.initial), driver_angle.period(model.manifest, values)
     given = ("samples_per_cycle", "times", "sample_rate")
     several = [f"{name} = {getattr(request, name)!r:.40}" for name in given if getattr(request, name) is not None]
     if len(several) > 1:
@@ -87,7 +87,9 @@ def _sample_times(
         duration = run_length(model, request, turn)
         check_length(begin + duration, turn)
         per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
-        wanted = np.rint(float(per_cycle) * duration / turn) if math.isfinite(turn) else float(per_cycle)
+        # a run-up has most of its turns behind a slow first one
+        turns = max(duration / turn, driver_angle.turns_passed(model.manifest, values, begin, begin + duration))
+        wanted = np.rint(float(per_cycle) * turns) if turns > 0.0 else float(per_cycle)
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
         return duration, begin + duration * (np.arange(count + 1) / count)

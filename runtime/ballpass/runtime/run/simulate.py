@@ -27,7 +27,6 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import DEFLECTION, reduction_rows, void_moment
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.casadi_run import integrate
 from ballpass.runtime.run.failure_location import locate_failure, ring_distances
 from ballpass.runtime.run.integration_error import IntegrationError
@@ -57,7 +56,7 @@ def simulate(
         The computation failed; the samples so far are in its attribute ``partial``.
     """
     started = clocks.perf_counter()
-    sampling = sampling_of(model, request, driver_angle.period(model.manifest, numbers.values))
+    sampling = sampling_of(model, request, numbers.values)
     # derivatives first: too many for the memory are refused before memory for the rest is allocated
     directions = prepare(len(sampling.times)) if prepare is not None else None
     run = resolve(model, numbers, request, duration=sampling.duration, stepper=False)
