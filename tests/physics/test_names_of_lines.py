@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.characteristic import CharacteristicLine, characteristic_lines, names_of
+from ballpass.runtime.quantity.characteristic import CharacteristicLine, characteristic_lines, names_of, without_chance
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.run.solution_file import load_solution
 
@@ -101,6 +101,45 @@ def test_sidebands_of_a_load_at_a_bearings_frequency_are_given_with_those_of_the
     assert (apart.words, others) == ("BPFI + shaft", [])
     damage, *_ = names_of(inner, (lines[0], replace(lines[1], frequency=inner - shaft), lines[2]), 0.5)
     assert damage.words == "BPFI"  # the simpler name, though the load has a sideband there
+
+
+def test_damage_beside_a_load_of_its_own_frequency_has_more_than_one_line() -> None:
+    """Shaft, load and ball pass mix to lines everywhere: one of them where BPFI has one is chance."""
+    shaft, inner, push = 50.0, 247.4, 67.3
+    lines = (
+        CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name=""),
+        CharacteristicLine(name="load push", bearing="", frequency=push, side=shaft, side_name="shaft"),
+        CharacteristicLine(name="BPFO", bearing="", frequency=152.6, side=shaft, side_name="shaft"),
+        CharacteristicLine(name="BPFI", bearing="", frequency=inner, side=shaft, side_name="shaft"),
+    )
+
+    def named(*at: float, among: tuple[CharacteristicLine, ...] = lines) -> list[str]:
+        found = without_chance([names_of(one, among, 0.5) for one in at], among)
+        return [names[0].words if names else "" for names in found]
+
+    assert named(push, shaft, inner) == ["load push", "shaft", ""]
+    assert named(push, inner, inner - shaft) == ["load push", "BPFI", "BPFI - shaft"]
+    assert named(shaft, 2 * shaft, inner, among=(lines[0], *lines[2:])) == ["shaft", "2 shaft", "BPFI"]
+    assert named(152.6 + 2 * push, 152.6, shaft) == ["BPFO + 2 load push", "BPFO", "shaft"]
+
+
+@pytest.mark.long
+def test_healthy_bearings_under_harmonic_loads_have_no_damage(make_model: Callable[..., Model]) -> None:
+    """Their sidebands with balls that pass, with a cage that slips, were BPFI and 2 BSF in every fifth spectrum."""
+    loads = "".join(
+        f'[loads.{name}]\ntype = "harmonic"\nmean = ["0 N", "0 N"]\namplitude = ["60 N", "36 N"]\n'
+        f'frequency = "{frequency} Hz"\nphase = "0 deg"\n\n'
+        for name, frequency in (("push", 37.3), ("pull", 21.7))
+    )
+    cage = ("[bearing.damping]", "[bearing.cage]\nslip = 0.0\n\n[bearing.damping]")
+    model = make_model("rotor", ("[bearing]\n", loads + "[bearing]\n"), cage)
+    drawn = np.random.default_rng(3)
+    for one in (423.1334, 721.0832, 593.3734, *drawn.uniform(60.0, 1000.0, 7)):
+        frequencies = {"loads.push.frequency": one, "loads.pull.frequency": float(drawn.uniform(60.0, 1000.0))}
+        slip = {"bearing.cage.slip": float(drawn.uniform(0.0, 0.05))}
+        for of in ("inner.x", "inner.ay"):
+            names = model.spectrum(of, parameters={**frequencies, **slip}).names
+            assert not [name for name in names if DAMAGED.search(name)], (one, names)
 
 
 def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:

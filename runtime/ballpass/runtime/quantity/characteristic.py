@@ -24,6 +24,8 @@ from ballpass.runtime.run.solution import Solution
 #: most shafts or cages to their sides.  With more of them everything would be something.
 MOST_MULTIPLES, MOST_SIDED, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
 
+SIDEBANDS = range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1)
+
 #: What a step from a simple name counts, in lines of the spectrum: their positions are known to a tenth [1].
 COMPLICATED = 0.02
 
@@ -72,6 +74,16 @@ class CharacteristicLine:
     def of_bearing(self) -> bool:
         """Whether it is of a bearing; else it is there without one."""
         return self.name in OF_BEARINGS
+
+    @property
+    def is_load(self) -> bool:
+        """Whether it is a harmonic load of a frequency of its own."""
+        return not self.of_bearing and self.side > 0.0
+
+    @property
+    def healthy(self) -> bool:
+        """Whether a healthy bearing has it: balls that pass the load, and what is there without a bearing."""
+        return self.name == "BPFO" or not self.of_bearing
 
     @property
     def label(self) -> str:
@@ -183,6 +195,7 @@ class LineName:
     frequency : of that, in the unit of the lines
     rank : how far from simple the words are
     beside : distance from the line of the spectrum, in lines of the spectrum [1]
+    of : label of the line that it is a multiple or a sideband of
     of_machine : whether it is the shaft or a load alone
     healthy : whether a healthy bearing has it: balls that pass the load, or sidebands of a harmonic load
     """
@@ -191,6 +204,7 @@ class LineName:
     frequency: float
     rank: int
     beside: float
+    of: str
     of_machine: bool
     healthy: bool
 
@@ -200,7 +214,8 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
 
     The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
     name of a bearing from a multiple of the shaft or of a load, that wins.  So does a name of balls that pass the load,
-    or of a load with sidebands, as a healthy bearing has them, against one of damage that is not simpler.
+    or of a load with sidebands, as a healthy bearing has them, against one of damage that is not simpler.  Loads of
+    frequencies of their own are sidebands of all these, and mix so much that damage has simple names only.
 
     Parameters
     ----------
@@ -208,23 +223,30 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     resolution : distance of two lines of the spectrum: largest distance of a name from the line
     """
     fits: list[LineName] = []
+    loads = [line for line in lines if line.is_load]
     for line in lines:
         if line.frequency == 0.0:
             continue
-        for m in range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1) if line.side else (0,):
+        sides = [(m, line.side, line.side_name) for m in SIDEBANDS if m and line.side]
+        if line.healthy and line.side:
+            sides += [(m, one.frequency, one.label) for one in loads if one is not line for m in SIDEBANDS if m]
+        for m, side, name in ((0, 0.0, ""), *sides):
             most = MOST_OF_CAGE if line.name == "FTF" else MOST_SIDED if m else MOST_MULTIPLES
-            k = Fraction(round((frequency - m * line.side) / line.frequency * line.parts), line.parts)
-            found = float(k) * line.frequency + m * line.side
-            beside = abs(frequency - found) / resolution
+            k = Fraction(round((frequency - m * side) / line.frequency * line.parts), line.parts)
+            found = float(k) * line.frequency + m * side
+            beside, rank = abs(frequency - found) / resolution, math.ceil(k) + 3 * abs(m)
+            if loads and not line.healthy and rank > SIMPLE:
+                continue
             if k > 0 and (k <= most or line.name == "shaft") and beside <= 1.0 + 1e-9:
                 fits.append(
                     LineName(
-                        words=_words(k, m, line),
+                        words=_words(k, m, line, name),
                         frequency=found,
-                        rank=math.ceil(k) + 3 * abs(m),
+                        rank=rank,
                         beside=beside,
+                        of=line.label,
                         of_machine=m == 0 and not line.of_bearing,
-                        healthy=line.name == "BPFO" or not line.of_bearing,
+                        healthy=line.healthy,
                     )
                 )
     if not fits:
@@ -236,6 +258,22 @@ def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
     near = [name for name in others if not name.of_machine and name.rank <= simple]
     return (first, *near[:MOST_NEAR])
+
+
+def without_chance(
+    found: Sequence[tuple[LineName, ...]], lines: Sequence[CharacteristicLine]
+) -> list[tuple[LineName, ...]]:
+    """Names of the highest lines of a spectrum, without damage that only one of several has.
+
+    Loads of frequencies of their own mix with the shaft and with ball pass to so many lines that some are by chance
+    where damage has one; damage has several.
+    """
+    if len(found) <= 2 or not any(line.is_load for line in lines):
+        return list(found)
+    families = [names[0].of for names in found if names]
+    return [
+        tuple(name for name in names if name.healthy or families.count(name.of) > 1) if names else () for names in found
+    ]
 
 
 def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
@@ -264,9 +302,9 @@ def carries_lines(manifest: Manifest, channel: str) -> bool:
     return not (channel.startswith(loads) or (manifest.mechanism is not None and ideal and channel.startswith(LINKAGE)))
 
 
-def _words(k: Fraction, m: int, line: CharacteristicLine) -> str:
+def _words(k: Fraction, m: int, line: CharacteristicLine, side: str) -> str:
     head = line.label if k == 1 else f"{k} x {line.label}" if line.name[0].isdigit() else f"{k} {line.label}"
     if m == 0:
         return head
     times = "" if abs(m) == 1 else f"{abs(m)} "
-    return f"{head} {'+' if m > 0 else '-'} {times}{line.side_name}"
+    return f"{head} {'+' if m > 0 else '-'} {times}{side}"

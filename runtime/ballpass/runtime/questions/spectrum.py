@@ -165,9 +165,10 @@ class SignalSpectrum(ShortRepr, Reported):
 
     @property
     def _found(self) -> list[tuple[LineName, ...]]:
-        from ballpass.runtime.quantity.characteristic import names_of
+        from ballpass.runtime.quantity.characteristic import names_of, without_chance
 
-        return [names_of(self._top(k), self.marks, self.resolution) for k in self.highest]
+        found = [names_of(self._top(k), self.marks, self.resolution) for k in self.highest]
+        return without_chance(found, self.marks)
 
     def _top(self, k: int) -> float:
         """Position of a local maximum: that of the parabola through the logarithms of three lines."""
