@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ballpass.runtime.app.summary_words import inside, row_place, row_words
@@ -16,10 +17,11 @@ from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.beats import beats
 from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.settle import look_beyond
+from ballpass.runtime.run.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -86,7 +88,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     SimulationError
         A run from another start failed.
     """
-    words = _part_of_cycle(run)
+    words = [*_part_of_cycle(run), *_part_of_beats(run, longer)]
     if longer is not None and longer.first:
         return [_start_words(model, longer), *words]
     if asked or longer is None or model.manifest.run.stated:
@@ -118,6 +120,37 @@ def _part_of_cycle(run: Run) -> list[str]:
         f"means and rms are over {turns:g} turns, and the loads repeat after {cycle}: some of these turns count more "
         f"often than others. Let {cycle}, or a multiple of that, be behind the transient (--cycles, --transient)."
     ]
+
+
+def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
+    """Warnings about beats that are slower than the run, where half a beat changes its numbers.
+
+    Raises
+    ------
+    SimulationError
+        The run that is half a beat further on failed.
+    """
+    model, values, words = run.model, run.numbers.values, []
+    turns = max((run.end - run.start) / run.turn, 0.0 if longer is None else longer.turns)
+    slow = [one for one in beats(model.manifest, values) if one.period > turns * run.turn]
+    if not slow or not repeats(model, values, run.start):
+        return []
+    here = reduced(run)
+    for beat in slow:
+        there = reduced(replace(run, numbers=model.numbers({**run.numbers.parameters, **beat.half})))
+        changes = changed(here, there)
+        name = max(changes, key=lambda one: max(changes[one][0] / PEAKS, changes[one][1] / MEANS))
+        peak, mean = changes[name]
+        if peak <= PEAKS and mean <= MEANS:
+            continue
+        needed = math.ceil(beat.period / run.turn)
+        words.append(
+            f"{beat.words} beats once in {beat.period:.4g} s, {rounded(beat.period / run.turn)} turns, of which the "
+            f"run has {turns:g}: half a beat later extremes of {name} change by {rounded(100.0 * peak, 2)} % of their "
+            f"range and its rms by {rounded(100.0 * mean, 2)} %. Numbers are those of a part of the beat; all of it "
+            f"takes --cycles {math.ceil(run.transient_cycles) + needed} --transient {run.transient_cycles:g}."
+        )
+    return words
 
 
 def _start_words(model: Model, longer: Settled) -> str:

@@ -20,6 +20,7 @@ from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, TURNED, re
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
 from ballpass.runtime.ratings.readings import LoadPowers, lives
 from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
@@ -79,6 +80,8 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     doubles = not given and repeats(model, numbers.values, transient * turn)
     turns: float = driver_angle.whole_cycles(numbers.values, LEAST)
     slowest = driver_angle.longest_harmonic(manifest, numbers.values) / turn
+    beat = slowest_beat(manifest, numbers.values, MOST // 2 * turn) / turn
+    turns = max(turns, driver_angle.whole_cycles(numbers.values, math.ceil(beat)))
     if slowest > 1.0:  # whole periods of the load, as far as there are turns
         turns = slowest * math.ceil(turns / slowest)
     covered, turns = 2 * turns <= MOST, min(turns, MOST // 2)

@@ -25,6 +25,7 @@ from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
@@ -107,10 +108,11 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     turn = driver_angle.period(model.manifest, numbers.values)
-    slowest = math.ceil(driver_angle.longest_harmonic(model.manifest, numbers.values) / turn)
+    slowest = driver_angle.longest_harmonic(model.manifest, numbers.values)
+    slowest = math.ceil(max(slowest, slowest_beat(model.manifest, numbers.values, MOST // 2 * turn)) / turn)
     turns = driver_angle.whole_cycles(numbers.values, max(LEAST, slowest))
     if not (real(most) >= 2 * turns and float(most).is_integer()):
-        why = f" The slowest harmonic load takes {slowest} turns for a period." if slowest > LEAST else ""
+        why = f" The slowest harmonic load, or beat, takes {slowest} turns for a period." if slowest > LEAST else ""
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
     transient = asked_transient(model, request.transient_cycles)
     dropped = _dropped(transient, start_time(request.initial), turn)
@@ -168,6 +170,13 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
     return look_beyond(resolve(model, numbers, request), few)
 
 
+def reduced(run: Run) -> Reductions:
+    """Reductions of the steady turns of a run."""
+    going = start_reducing(run, channel_names(run.model.manifest))
+    going.go_on()
+    return going.take()
+
+
 def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
 
@@ -186,9 +195,7 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     if not repeats(model, run.numbers.values, run.start):
         return None
     if few is None:
-        going = start_reducing(run, channel_names(model.manifest))
-        going.go_on()
-        few = going.take()
+        few = reduced(run)
     whole = (few.start + few.duration - run.begin) / turn
     cycle = driver_angle.cycle_turns(run.numbers.values)
     turns = min(driver_angle.whole_cycles(run.numbers.values, LEAST), int(STEPS * whole / max(few.steps, 1)))
