@@ -323,6 +323,14 @@ def test_wrong_names_are_refused_with_a_remedy(make_model: Callable[..., Model],
         quantities_of(make_model("punching_press"), [text])
 
 
+@pytest.mark.parametrize("kind", ["value:inner.y", "static_deflection"])
+def test_angles_of_a_motor_are_refused_and_times_are_not(make_model: Callable[..., Model], kind: str) -> None:
+    model = make_model("punching_press_motor")
+    assert [item.place for item in quantities_of(model, [f"{kind}@0.1s"])] == ["0.1s"]
+    with pytest.raises(RequestError, match=r"the driver passes an angle when its motion does.* @0\.41s"):
+        quantities_of(model, [f"{kind}@240deg"])
+
+
 @pytest.mark.parametrize("scene", ["punching_press", "offset_slider", "four_bar"])
 @pytest.mark.parametrize(
     "text",

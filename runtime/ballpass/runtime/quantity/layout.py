@@ -304,7 +304,7 @@ class NodeLayer:
 
     def _is_kinked(self, item: Quantity) -> bool:
         """Whether a quantity integrates an output."""
-        return not self._is_found(item) and not kind_of(item).extremes and item.channel not in self.model.states
+        return kind_of(item).integrates and item.channel not in self.model.states
 
     def _with_extremes(self, run: Run, layout: Layout, row: Array) -> Layout:
         """The same with the extremes of its quantities, and the next ones."""
@@ -340,7 +340,7 @@ class NodeLayer:
         """
         kind = kind_of(quantity)
         top = set(kind.extremes) <= {"max"} or quantity.channel in self.model.states
-        return kind.at_moment or (bool(kind.extremes) and top and self._is_held(quantity))
+        return not kind.integrates and (kind.at_moment or (top and self._is_held(quantity)))
 
     def _is_held(self, quantity: Quantity) -> bool:
         return is_reduced(self.model, quantity) and quantity not in self._along_nodes

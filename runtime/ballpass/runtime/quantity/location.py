@@ -222,12 +222,13 @@ def is_instant(manifest: Manifest | None, place: str) -> bool:
     return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
 
 
-def check_first_turns(_manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
-    """Raise `RequestError`, in the unit that was given, where the angle of a quantity at rest is beyond two turns."""
-    if not quantity.place:
+def check_first_turns(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
+    """Raise `RequestError` for an angle of a quantity at rest where the driver's speed changes, or beyond two turns."""
+    if not quantity.place or named_place(quantity).kind != "angle":
         return
-    asked = named_place(quantity)
-    if asked.kind == "angle" and abs(asked.number) > LARGEST_ANGLE:
+    start = "Give the angle as mechanism.driver.start_angle, or name a time instead, as in @0.41s"
+    _refuse_driven(manifest, quantity, f"passes an angle when its motion does. {start}")
+    if abs(named_place(quantity).number) > LARGEST_ANGLE:
         allowed = "-720deg to 720deg" if quantity.place.endswith("deg") else "-4 pi to 4 pi rad"
         raise RequestError(
             f"{quantity.name}: {quantity.place} is more than two turns, while the angle is one of the first turn. "

@@ -322,7 +322,7 @@ class _Differentiated:
         }
         points = [(one.segment, one.fraction) for some in layout.extremes.values() for one in some]
         points += [point for some in beside.values() for point in some]
-        integrated = any(_is_integrated(item) for item in layout.items)
+        integrated = any(kind_of(item).integrates for item in layout.items)
         plan = with_points(layout.plan if integrated else no_nodes(), list(dict.fromkeys(points)))
         self.nodes, self.marks = _with_moments(run, layout, self.edges, place(plan, self.edges), chain)
         for key, some in layout.extremes.items():
@@ -335,16 +335,12 @@ def _by_nodes(layout: Layout) -> list[Layout]:
     """Quantities that are integrated over the run, and those at single points, which cost nothing between them."""
     parts = []
     for integrated in (True, False):
-        items = tuple(item for item in layout.items if _is_integrated(item) is integrated)
+        items = tuple(item for item in layout.items if kind_of(item).integrates is integrated)
         names = {item.name for item in items}
         extremes = {key: some for key, some in layout.extremes.items() if key[0] in names}
         if items:
             parts.append(replace(layout, items=items, extremes=extremes))
     return parts
-
-
-def _is_integrated(quantity: Quantity) -> bool:
-    return not (kind_of(quantity).extremes or kind_of(quantity).at_moment)
 
 
 def _evaluated(view: View, quantity: Quantity) -> Estimate:

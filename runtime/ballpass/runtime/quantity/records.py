@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import HEAD, ReductionRows, reduction_rows
+from ballpass.runtime.native.reduction_rows import HEAD, MOMENTS, ReductionRows, reduction_rows
 from ballpass.runtime.quantity.nodes import Nodes
 from ballpass.runtime.run.resolve import Run
 
@@ -110,6 +110,11 @@ class Kind:
     reduced: Callable[[ReducedRuns, Quantity], Array] | None = None
     needs: Callable[[str], tuple[str, ...]] | None = None
     rows: tuple[str, ...] = ()
+
+    @property
+    def integrates(self) -> bool:
+        """Whether it is an integral over the run; of a kind with extremes as well its rows say so."""
+        return not (self.extremes or self.at_moment) or any(row in MOMENTS for row in self.rows)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
