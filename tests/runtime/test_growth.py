@@ -111,8 +111,15 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
         return done.exit_code, done.stdout, done.stderr
 
     wide, turns = ("--set", f"{CLEARANCE}=60 um"), ("--cycles", "12", "--no-figures")
-    code, shown, said = ballpass("run", PRESS, *wide, *turns)
+    asked = ("rms:inner.x", "mean:inner.x")
+    code, shown, said = ballpass("run", PRESS, *wide, *turns, *(f"--of={name}" for name in asked))
     assert code == 0
+    summary = json.loads((tmp_path / "results" / PRESS.stem / "summary.json").read_text(encoding="utf-8"))
+    found = [summary["quantities"][name]["over_starts"]["value"] for name in asked]
+    of_channel = summary["inner.x"]["over_starts"]["rms"]
+    assert found[0] == pytest.approx({name: of_channel[name] for name in found[0]}, rel=1e-9, abs=0.0)
+    assert found[1]["std"] > 0.0
+    assert all(re.search(rf"{name} +\S+ ±\S+ +µm", shown) for name in asked)
     assert "amplifies small errors" in said
     lines = shown.splitlines()
     (row,) = [k for k, line in enumerate(lines) if line.strip().startswith("Inner ring, x")]

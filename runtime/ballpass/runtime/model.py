@@ -632,11 +632,13 @@ class Model(PointModel, Questions):
         parameters: Mapping[str, float] | None = None,
         rtol: float | None = None,
         initial: Initial = None,
+        of: str | Sequence[str] | None = None,
         progress: Progress = None,
     ) -> Growth:
         """Change of the extremes of a run when its start moves by the tolerance; see `ballpass.runtime.certify.growth`.
 
-        Takes two runs of the stepper, without samples.  Parameters are those of `simulate`.
+        Takes two runs of the stepper, without samples.  Parameters are those of `simulate`; of a motion that grows,
+        quantities in `of` get mean and deviation over moved starts.
 
         Raises
         ------
@@ -660,7 +662,8 @@ class Model(PointModel, Questions):
             transient_cycles=transient,
         )
         with shown("simulating from two starts", progress) as tell:
-            return find_growth(self, numbers, replace(request, progress=tell))
+            names = dict.fromkeys([of] if isinstance(of, str) else of or ())
+            return find_growth(self, numbers, replace(request, progress=tell), of=tuple(names))
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

@@ -19,7 +19,6 @@ from ballpass.runtime.report.report import ReportTable
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
-    from ballpass.runtime.quantity.values import QuantityValue
     from ballpass.runtime.run.accuracy import Accuracy
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
@@ -122,15 +121,16 @@ def _of_run(key: str, value: float) -> str:
     return str(value) if isinstance(value, int) else rounded(value)
 
 
-def render_quantities(manifest: Manifest, found: Mapping[str, QuantityValue]) -> ReportTable:
-    """Quantities of ``--of``."""
+def render_quantities(manifest: Manifest, found: Mapping[str, Mapping[str, Any]]) -> ReportTable:
+    """Quantities of ``--of``, as the summary has them."""
     rows = []
     for name, one in found.items():
-        factor, unit = table_unit(one.unit)
-        time = "" if one.time is None else f"t = {one.time:.6g} s"
+        factor, unit = table_unit(one["unit"])
+        time = "" if one["time"] is None else f"t = {one['time']:.6g} s"
         channel = parse_quantity(manifest, name).channel
-        ball = "" if one.ball is None else bearing_words(f"ball {one.ball}", manifest.bearings, channel)
-        rows.append((name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
+        ball = "" if one["ball"] is None else bearing_words(f"ball {one['ball']}", manifest.bearings, channel)
+        value = written(one, "value", factor, " ") if "over_starts" in one else f"{factor * one['value']:z.6g}"
+        rows.append((name, value, unit, ", ".join(filter(None, [time, ball]))))
     heads, caption = ("quantity", "value", "unit", "at"), _quantities_words(manifest, found)
     return ReportTable(title="Quantities", heads=heads, rows=rows, right=("value",), caption=caption)
 

@@ -91,6 +91,7 @@ class Growth(ShortRepr):
     lost : of channels whose numbers errors of the steps put off by more than their digits: by how much [1]
     spread : by ("min", "max" or "rms", channel), where anything is uncertain or the states part: mean and standard
         deviation over `STARTS` moved starts
+    asked : the same of the quantities that were asked for beside
     """
 
     moved: float
@@ -100,6 +101,7 @@ class Growth(ShortRepr):
     steps: int = 0
     lost: Mapping[str, float] = field(default_factory=dict)
     spread: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
+    asked: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def worst(self) -> float:
@@ -136,12 +138,15 @@ def largest_first(changes: Mapping[str, float]) -> str:
     return f"{worst} by {rounded(100.0 * changes[worst], 2)} %" + (f", and less {', '.join(others)}" if others else "")
 
 
-def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, spread: bool = True) -> Growth:
+def find_growth(
+    model: LoadedModel, numbers: Numbers, request: Request, *, spread: bool = True, of: Sequence[str] = ()
+) -> Growth:
     """Compare a run with one from a moved start, both by the project's own stepper.
 
     Parameters
     ----------
     spread : run more moved starts where digits are uncertain, for `Growth.spread`
+    of : quantities for `Growth.asked`
 
     Raises
     ------
@@ -167,7 +172,7 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, sprea
             tight = _numbers(run, replace(way, rtol=max(TIGHTER * way.rtol, TOLERANCES[0])))
             off = {name: _relative(plain[name], tight[name]) for name in found.changes if name not in found.uncertain}
             found = replace(found, lost={name: part for name, part in off.items() if part > LOST * DIGITS})
-    return _spread(run, way, found) if (found.uncertain or found.parted > PARTED) and spread else found
+    return _spread(run, way, found, of) if (found.uncertain or found.parted > PARTED) and spread else found
 
 
 def by_moved_start(run: Run, moved: np.ndarray, most: int) -> Growth:
@@ -236,10 +241,10 @@ def _compare(run: Run, way: MethodChoice, moved: np.ndarray) -> tuple[Growth, di
     return found, dict(zip(channels, one, strict=True))
 
 
-def _channels(run: Run) -> tuple[list[str], QuantityRun]:
-    """What is compared."""
+def _channels(run: Run, of: Sequence[str] = ()) -> tuple[list[str], QuantityRun]:
+    """What is compared, and behind it other quantities."""
     channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
-    names = [f"{kind}:{name}" for name in channels for kind in KINDS]
+    names = [*(f"{kind}:{name}" for name in channels for kind in KINDS), *of]
     return channels, QuantityRun(run.model, quantities_of(run.model, names))
 
 
@@ -262,9 +267,9 @@ def _relative(numbers: np.ndarray, others: np.ndarray) -> float:
     return float(np.max(np.abs(numbers - others)[sizes > 0.0] / sizes[sizes > 0.0], initial=0.0))
 
 
-def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
+def _spread(run: Run, way: MethodChoice, found: Growth, of: Sequence[str]) -> Growth:
     """The same, with which numbers are uncertain and how much by more starts, moved by one tolerance, two, ..."""
-    channels, quantities = _channels(run)
+    channels, quantities = _channels(run, of)
     names = [(kind, channel) for channel in channels for kind in KINDS]
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
     every = []
@@ -275,12 +280,15 @@ def _spread(run: Run, way: MethodChoice, found: Growth) -> Growth:
     mean, deviation = np.mean(every, axis=0), np.std(every, axis=0, ddof=1)
     # twice the deviation is what is printed behind +-
     changes = dict(found.changes)
-    table = zip(channels, mean.reshape(-1, len(KINDS)), deviation.reshape(-1, len(KINDS)), strict=True)
+    by_channel = (part[: len(names)].reshape(-1, len(KINDS)) for part in (mean, deviation))
+    table = zip(channels, *by_channel, strict=True)
     for name, middle, apart in table:
         changes[name] = max(changes[name], _relative(middle + 2.0 * apart, middle))
     uncertain = tuple(name for name in channels if name in found.uncertain or changes[name] > DIGITS)
-    spread = dict(zip(names, zip(mean.tolist(), deviation.tolist(), strict=True), strict=True))
-    return replace(found, changes=changes, uncertain=uncertain, spread=spread)
+    pairs = list(zip(mean.tolist(), deviation.tolist(), strict=True))
+    by_name = {item.name: pair for item, pair in zip(quantities.quantities, pairs, strict=True)}
+    spread, asked = dict(zip(names, pairs, strict=False)), {name: by_name[name] for name in of}
+    return replace(found, changes=changes, uncertain=uncertain, spread=spread, asked=asked)
 
 
 def simulate_members(

@@ -195,6 +195,7 @@ def run(
                 parameters=asked.overrides,
                 rtol=solution.statistics.rtol,
                 initial=start,
+                of=of,
             )
         longer = None
         if turns is not None:
@@ -254,6 +255,8 @@ def run(
             note(words)
         if asked_for:
             summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
+            for name, (mean, deviation) in (growth.asked if growth is not None else {}).items():
+                summary["quantities"][name]["over_starts"] = {"value": {"mean": mean, "std": deviation}}
         turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
@@ -270,7 +273,7 @@ def run(
     if left_out:
         show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
     if asked_for and solution.accuracy is None:
-        show_parts(render_quantities(model.manifest, asked_for))
+        show_parts(render_quantities(model.manifest, summary["quantities"]))
     if turned:
         show_parts(turned)
     if solution.accuracy is not None:
