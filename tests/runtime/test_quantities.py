@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -384,3 +385,27 @@ def test_angles_of_driver_and_cage_do_not_depend_on_edges_of_loads(make_model: C
     for name, angle in expected.items():
         got = [found[f"{kind}:{name}"].value for kind in ("max", "min", "mean", "rms")]
         assert got == pytest.approx([max(angle), min(angle), np.mean(angle), np.sqrt(np.mean(angle**2))], abs=1e-5)
+
+
+def test_time_of_the_largest_load_of_an_unbalance_moves_with_its_angle_and_with_the_speed(
+    make_model: Callable[..., Model],
+) -> None:
+    """The load turns with the shaft: its time is an angle over the speed.  It falls on an end of the grid of nodes."""
+    model = make_model("rotor")
+    speed = model.parameters["shaft.speed"]
+    names = ["loads.unbalance.angle", "shaft.speed"]
+    report = model.sensitivity(["peak_time:load.y", "min_time:load.y"], names, cycles=2, transient=1)
+    for first, second in (report.pairs[:2], report.pairs[2:]):
+        assert first.derivative == pytest.approx(-1.0 / speed, rel=1e-9)
+        assert second.derivative == pytest.approx(-first.value / speed, rel=1e-9)
+    assert {pair.check.verdict for pair in report.pairs} == {Verdict.VERIFIED}
+
+
+def test_lives_of_two_bearings_have_the_same_bits_in_runs_and_members(make_model: Callable[..., Model]) -> None:
+    model = make_model("rotor_two_bearings")
+    names = [f"{bearing}.{kind}" for bearing in ("pulley", "free_end") for kind in ("life_miner", "life_sectors")]
+    options: dict[str, Any] = {"cycles": 2, "transient": 1, "rtol": 1e-9, "kinks": "located"}
+    alone = {name: one.value for name, one in model.quantities(names, **options).items()}
+    width = "bearings.pulley.clearance"
+    many = model.simulate_many({width: [model.parameters[width]] * 2}, names, **options)
+    assert {name: many[name].tolist() for name in names} == {name: [value] * 2 for name, value in alone.items()}

@@ -406,8 +406,11 @@ def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
     if not np.any(inside) or extreme.other is not None:
         return ()
     low, high = ends[int(np.flatnonzero(inside)[0])].tolist()
-    distance = min(AROUND * (high - low), min(extreme.fraction - low, high - extreme.fraction) / (BESIDE + 0.1))
-    if distance < NEAREST * (high - low):
+    length = high - low
+    if layout.still:  # panels of what follows from time alone end at no kink
+        low, high = 0.0, 1.0
+    distance = min(AROUND * length, min(extreme.fraction - low, high - extreme.fraction) / (BESIDE + 0.1))
+    if distance < NEAREST * length:
         return ()
     return tuple((extreme.segment, extreme.fraction + j * distance) for j in range(-BESIDE, BESIDE + 1) if j)
 

@@ -167,7 +167,9 @@ def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) 
 
 def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> Array:
     bearing = _bearing(runs.manifest, quantity)
-    found = lives(ratings_of(bearing, runs.values), load_powers(runs.manifest, bearing, runs.rows, runs.values))
+    # powers of numbers and of arrays differ in the last bit
+    values = {name: np.atleast_1d(value) for name, value in runs.values.items()}
+    found = lives(ratings_of(bearing, values), load_powers(runs.manifest, bearing, runs.rows, values))
     return np.asarray(np.min([found[reading] for reading in readings], axis=0))
 
 
