@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.kinks import crossings
+from ballpass.runtime.quantity.kinks import crossings, find_kinks, rank_differences
 from ballpass.runtime.quantity.nodes import Edges, place
 from ballpass.runtime.quantity.panels import GAUSS, interpolated, panels_between, plan_of
 
@@ -41,8 +41,20 @@ def test_kinks_between_the_nodes_of_a_panel_are_found(roots: tuple[float, ...]) 
     edges = Edges(times=np.array([0.0, 2.0]), slopes=np.zeros((2, 0)), segment=np.zeros(1, dtype=int), first=0)
     panels = panels_between(edges, np.array([1.0]), np.array([False]))
     signal = np.prod([panels.at(GAUSS)[0].ravel() * 2.0 - root for root in roots], axis=0)
-    t, panel, values = interpolated(panels, edges, signal[:, None])
+    t, panel, values = interpolated(panels, edges, signal.reshape(len(panels), len(GAUSS), 1))
     assert crossings(t, panel, values[:, 0]) == pytest.approx(roots, abs=1e-12)
+
+
+def test_only_a_change_of_the_most_loaded_ball_is_a_kink() -> None:
+    """Two loads that are equal at pi/4, where a third one is above both, and at 5 pi/4, where they are the largest."""
+    t = np.linspace(0.0, 2.0 * np.pi, 400)
+    segment = np.zeros(len(t), dtype=int)
+    signals, counts = rank_differences(
+        segment, np.stack([np.sin(t), np.cos(t), 0.9 - 0.3 * (t - np.pi / 4.0) ** 2], axis=1)
+    )
+    found = find_kinks(t, segment, signals, length=t[-1], edges=t[[0, -1]], counts=counts)
+    assert np.min(np.abs(found - 1.25 * np.pi)) < 1e-6
+    assert np.min(np.abs(found - 0.25 * np.pi)) > 0.1
 
 
 @pytest.mark.long

@@ -27,7 +27,7 @@ APART = 1e-9
 HALVINGS = 45
 
 
-def crossings(t: Array, segment: NDArray[np.int_], *signals: Array) -> Array:
+def crossings(t: Array, segment: NDArray[np.int_], *signals: Array, counts: NDArray[np.bool_] | None = None) -> Array:
     """Times at which signals change sign within a segment, those of the first signal first, each increasing.
 
     Parameters
@@ -35,9 +35,12 @@ def crossings(t: Array, segment: NDArray[np.int_], *signals: Array) -> Array:
     t : times that increase within each segment, shape (n,) [s]
     segment : shape (n,)
     signals : shape (n,) each
+    counts : at which places each signal counts, shape (signals, n); None: at all
     """
     same = (np.diff(segment) == 0) & (np.diff(t) > 0.0)
     places = [np.flatnonzero(same & (signal[:-1] * signal[1:] < 0.0)) for signal in signals]
+    if counts is not None:
+        places = [place[here[place] | here[place + 1]] for place, here in zip(places, counts, strict=True)]
     found = np.concatenate([np.zeros(0, dtype=np.int_), *places])
     if not len(found):
         return np.zeros(0)
@@ -74,7 +77,15 @@ def _cubics(nodes: Array, values: Array) -> Array:
     return found
 
 
-def find_kinks(t: Array, segment: NDArray[np.int_], signals: Array, *, length: float, edges: Array) -> Array:
+def find_kinks(
+    t: Array,
+    segment: NDArray[np.int_],
+    signals: Array,
+    *,
+    length: float,
+    edges: Array,
+    counts: NDArray[np.bool_] | None = None,
+) -> Array:
     """Times at which signals pass zero, increasing, apart from each other and from the edges [s].
 
     Parameters
@@ -83,29 +94,29 @@ def find_kinks(t: Array, segment: NDArray[np.int_], signals: Array, *, length: f
     signals : shape (n, signals)
     length : of the time that counts [s]
     edges : times that are edges already [s]
+    counts : at which places each signal counts, shape (n, signals); None: at all
     """
-    kept: list[float] = []
-    times = np.sort(crossings(t, segment, *signals.T))
+    times = np.sort(crossings(t, segment, *signals.T, counts=None if counts is None else counts.T))
     behind = np.clip(np.searchsorted(edges, times), 1, len(edges) - 1)
-    free = np.minimum(np.abs(times - edges[behind - 1]), np.abs(edges[behind] - times)) > APART * length
-    for time in times[free].tolist():
-        if not kept or time - kept[-1] > APART * length:
-            kept.append(time)
-    return np.array(kept)
+    times = times[np.minimum(np.abs(times - edges[behind - 1]), np.abs(edges[behind] - times)) > APART * length]
+    return times[np.diff(times, prepend=-np.inf) > APART * length]
 
 
-def rank_differences(segment: NDArray[np.int_], table: Array) -> Array:
-    """Differences that pass zero where another ball becomes the most loaded one, shape (n, pairs).
-
-    Those of two less loaded balls may be among them; a panel that ends there does no harm.
+def rank_differences(segment: NDArray[np.int_], table: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Differences that pass zero where another ball becomes the most loaded one, and where one of both is that ball.
 
     Parameters
     ----------
     table : forces of the balls, shape (n, balls)
+
+    Returns
+    -------
+    shape (n, pairs) each
     """
     best = np.argmax(table, axis=1)
     changes = np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
     pairs = sorted(
         {(min(pair), max(pair)) for pair in zip(best[changes].tolist(), best[changes + 1].tolist(), strict=True)}
     )
-    return table[:, [a for a, _ in pairs]] - table[:, [b for _, b in pairs]]
+    one, other = np.array(pairs, dtype=np.int_).reshape(-1, 2).T
+    return table[:, one] - table[:, other], (best[:, None] == one) | (best[:, None] == other)

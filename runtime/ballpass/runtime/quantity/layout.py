@@ -21,16 +21,28 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
 from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks, rank_differences
-from ballpass.runtime.quantity.nodes import Edges, NodePlan, Nodes, make_edges, no_nodes, place, with_passages
+from ballpass.runtime.quantity.nodes import (
+    Edges,
+    NodePlan,
+    Nodes,
+    make_edges,
+    no_nodes,
+    part_of_nodes,
+    place,
+    with_passages,
+)
 from ballpass.runtime.quantity.panels import (
     GAUSS,
     Panels,
+    bounds,
     cut_at,
+    inner_nodes,
     interpolated,
     panels_of_steps,
     parts_needed,
     parts_of_oscillation,
     plan_of,
+    same_panels,
     split,
     uniform_panels,
 )
@@ -57,6 +69,9 @@ AROUND, NEAREST = 0.1, 1e-3
 
 #: Nodes on either side of such an extreme.
 BESIDE = 3
+
+#: A ball that carries less than the most loaded one by more than this share becomes it in no panel [1].
+NEAR_TOP = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -188,11 +203,42 @@ class NodeLayer:
         return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.turn, turned if angle else None)
 
     def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
-        """The run along the nodes of panels."""
-        plan = plan_of(panels, layout.edges)
-        nodes = place(plan, layout.edges)
-        track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
-        signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
+        """The run along the nodes of panels; what the layout knows in panels that it has is taken from there."""
+        plan, channels = plan_of(panels, layout.edges), self._channels.only(channels_of(layout.items))
+        nodes, known = place(plan, layout.edges), layout.track
+        if known is None or layout.panels is None:
+            track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
+            signals = channels.along(track, run.numbers)
+            return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
+        here, there = (
+            inner_nodes(one)[same].ravel()
+            for one, same in zip((panels, layout.panels), same_panels(panels, layout.panels), strict=True)
+        )
+        fresh = np.delete(np.arange(len(nodes)), here)
+
+        def joined(new: Array, old: Array) -> Array:
+            every = np.empty((len(nodes), *new.shape[1:]))
+            every[fresh], every[here] = new, old[there]
+            return every
+
+        part = follow(
+            *(run, layout.segments, layout.edges, part_of_nodes(nodes, fresh)), kept=layout.kept, still=layout.still
+        )
+        signals = {
+            name: Signal(
+                value=joined(signal.value, layout.signals[name].value),
+                slope=joined(signal.slope, layout.signals[name].slope),
+            )
+            for name, signal in channels.along(part, run.numbers).items()
+        }
+        track = replace(
+            part,
+            nodes=nodes,
+            x=joined(part.x, known.x),
+            slope=joined(part.slope, known.slope),
+            local=joined(part.local, known.local),
+            u=joined(part.u, known.u),
+        )
         return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
 
     def _with_wraps(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Layout:
@@ -203,7 +249,7 @@ class NodeLayer:
         if not len(times):
             return layout
         edges = with_passages(layout.edges, times, np.zeros((len(times), 0)))
-        layout = replace(layout, edges=edges, wraps=times)
+        layout = replace(layout, edges=edges, wraps=times, panels=None)
         return self._along(run, layout, self._panels(run, layout, kinks))
 
     def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
@@ -214,7 +260,7 @@ class NodeLayer:
             passages = find_passages(run, layout.track)
             if passages.edges:
                 edges = with_passages(layout.edges, passages.times, np.zeros((len(passages.times), 0)))
-                layout = replace(layout, edges=edges, passages=passages)
+                layout = replace(layout, edges=edges, passages=passages, panels=None)
                 layout = self._along(run, layout, self._panels(run, layout, kinks))
         assert layout.panels is not None
         each = []
@@ -249,9 +295,12 @@ class NodeLayer:
         for item in layout.items:
             times = np.zeros(0)
             if self._is_kinked(item) and _is_of_balls(item) and item.ball is None and not kind_of(item).steep:
-                t, segment, table = _between_nodes(layout, layout.signals[item.channel].value)
-                signals = rank_differences(segment, table)
-                times = find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times)
+                forces = _at_nodes(layout, layout.signals[item.channel].value)
+                low, high = bounds(forces)
+                close = np.count_nonzero(high >= np.max(low, axis=1, keepdims=True), axis=1) > 1
+                t, segment, table = _between_nodes(layout, forces, close)
+                signals, counts = rank_differences(segment, table)
+                times = find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times, counts=counts)
             each.append((item, cut_at(layout.panels, layout.edges, times)))
         return self._each_along(run, layout, each)
 
@@ -298,9 +347,20 @@ class NodeLayer:
         stops, numbers = {stop: _hysteresis(stop) for stop in self.model.manifest.stops}, run.numbers.parameters
         columns = {stop: self._deflections.column(stop) for stop in stops}
         clips = [1.0 + numbers[name] * rates[:, [columns[stop]]] for stop, name in stops.items() if name in numbers]
-        values = np.hstack([values, *clips])
-        t, segment, signals = _between_nodes(layout, np.hstack([values, rates]) if corner else values)
-        return find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times)
+        every, forces = [values, *clips], np.zeros((len(values), 0))
+        if corner:
+            # of one bearing, and of those balls that the quantity is of
+            forces = layout.signals[item.channel].value
+            first = self._deflections.column(item.channel.partition("ball.")[0] + DEFLECTION)
+            every.append(rates[:, first : first + forces.shape[1]])
+        signals = _at_nodes(layout, np.hstack([*every, forces]))
+        count = signals.shape[2] - forces.shape[1]
+        low, high = bounds(signals[:, :, :count])
+        t, segment, signals = _between_nodes(layout, signals, np.any((low < 0.0) & (high > 0.0), axis=1))
+        counts = np.ones((len(t), count), dtype=bool)
+        counts[:, count - forces.shape[1] :] = _taking_part(item, signals[:, count:])
+        edges = layout.edges.times
+        return find_kinks(t, segment, signals[:, :count], length=run.duration, edges=edges, counts=counts)
 
     def _is_kinked(self, item: Quantity) -> bool:
         """Whether a quantity integrates an output."""
@@ -360,11 +420,29 @@ def channels_of(quantities: Iterable[Quantity]) -> list[str]:
     return list(names)
 
 
-def _between_nodes(layout: Layout, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:
-    """Times, intervals and signals at places between the nodes of panels too."""
-    assert layout.track is not None
+def _at_nodes(layout: Layout, signals: Array) -> Array:
+    """Signals at the nodes of panels, shape (panels, 4, columns), of those along a track."""
     assert layout.panels is not None
-    return interpolated(layout.panels, layout.edges, signals[np.flatnonzero(layout.track.nodes.weight)])
+    return signals[inner_nodes(layout.panels)]
+
+
+def _between_nodes(layout: Layout, signals: Array, which: NDArray[np.bool_]) -> tuple[Array, NDArray[np.int_], Array]:
+    """Times, intervals and signals at places between the nodes of some of the panels too."""
+    assert layout.panels is not None
+    rows = np.flatnonzero(which)
+    return interpolated(layout.panels.some(rows), layout.edges, signals[rows])
+
+
+def _taking_part(item: Quantity, forces: Array) -> NDArray[np.bool_]:
+    """Which balls a quantity is of at each place, shape of `forces`: the most loaded one, and those near to it."""
+    if item.ball is not None:
+        return np.broadcast_to(np.arange(forces.shape[1]) == item.ball - 1, forces.shape)
+    if kind_of(item).beside or kind_of(item).steep:
+        return np.ones(forces.shape, dtype=bool)
+    if not forces.size:
+        return np.zeros(forces.shape, dtype=bool)
+    top = np.max(forces, axis=1, keepdims=True)
+    return np.asarray(forces >= top - NEAR_TOP * np.abs(top))
 
 
 def _hysteresis(stop: str) -> str:

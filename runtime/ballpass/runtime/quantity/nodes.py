@@ -196,6 +196,11 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
     return Nodes(**{item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Nodes)})
 
 
+def part_of_nodes(nodes: Nodes, part: slice | NDArray[np.int_]) -> Nodes:
+    """Some of the nodes."""
+    return Nodes(**{item.name: getattr(nodes, item.name)[part] for item in fields(Nodes)})
+
+
 def find(edges: Edges, time: float) -> tuple[int, float]:
     """Interval and fraction of a time; an edge belongs to the interval after it."""
     last = len(edges.times) - 2

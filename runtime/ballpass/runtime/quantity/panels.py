@@ -11,12 +11,12 @@ seven, and the size of the part of third degree at its nodes gives how many time
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, NodePlan, ordered_plan
+from ballpass.runtime.quantity.nodes import Edges, NodePlan
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,9 @@ BETWEEN = np.linspace(0.0, 1.0, 9)
 
 #: Matrix that takes values at the nodes to these places, by the polynomial through them.
 _TO_BETWEEN = np.vander(2.0 * BETWEEN - 1.0, 4) @ np.linalg.inv(np.vander(_GAUSS, 4))
+
+#: How far a signal may lie there beyond its values at the nodes, over the range of these [1].
+_BEYOND = 0.5 * (float(np.max(np.sum(np.abs(_TO_BETWEEN), axis=1))) - 1.0)
 
 #: Fewest panels in a turn where no steps are taken: of outputs that follow from time alone.
 FEWEST = 256
@@ -83,6 +86,10 @@ class Panels:
     def __len__(self) -> int:
         return len(self.segment)
 
+    def some(self, rows: NDArray[np.int_]) -> Panels:
+        """Some of them."""
+        return Panels(**{item.name: getattr(self, item.name)[rows] for item in fields(self)})
+
     def at(self, part: Array) -> tuple[Array, Array]:
         """Fractions of the interval at parts of each panel, and how fast they grow with the part.
 
@@ -96,9 +103,12 @@ class Panels:
         """
         width = (self.end - self.begin)[:, None]
         s = self.begin[:, None] + width * part
-        low, high = self.kinked[:, :1], self.kinked[:, 1:]
-        place = np.select([low & high, low, high], [s**2 * (3.0 - 2.0 * s), s**2, 1.0 - (1.0 - s) ** 2], s)
-        rate = np.select([low & high, low, high], [6.0 * s * (1.0 - s), 2.0 * s, 2.0 * (1.0 - s)], 1.0)
+        place, rate, (low, high) = s.copy(), np.ones_like(s), self.kinked.T
+        after, before, between = low & ~high, high & ~low, low & high
+        place[after], rate[after] = s[after] ** 2, 2.0 * s[after]
+        place[before], rate[before] = 1.0 - (1.0 - s[before]) ** 2, 2.0 * (1.0 - s[before])
+        place[between] = s[between] ** 2 * (3.0 - 2.0 * s[between])
+        rate[between] = 6.0 * s[between] * (1.0 - s[between])
         span = (self.high - self.low)[:, None]
         return self.low[:, None] + span * place, span * width * rate
 
@@ -112,8 +122,7 @@ def uniform_panels(edges: Edges, turn: float) -> Panels:
     """
     lengths = np.diff(edges.times)[edges.first :]
     counts = np.maximum(np.ceil(lengths * FEWEST / min(turn, float(np.sum(lengths)))), 1).astype(int)
-    whole = np.arange(edges.first, len(edges.times) - 1)
-    return split(_spans(whole, np.zeros(len(whole)), np.ones(len(whole)), np.zeros((len(whole), 2))), counts)
+    return split(panels_between(edges, np.zeros(0), np.zeros(0, dtype=bool)), counts)
 
 
 def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None) -> Panels:
@@ -139,13 +148,6 @@ def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: f
     return split(panels, np.maximum(np.ceil(parts * (1.0 - 1e-9)), 1).astype(int))
 
 
-def _spans(segment: NDArray[np.int_], low: Array, high: Array, kinked: Array) -> Panels:
-    """Panels that are whole spans; those at a kink in two."""
-    zeros, sides = np.zeros(len(segment)), kinked.astype(bool)
-    panels = Panels(segment=segment, low=low, high=high, kinked=sides, begin=zeros, end=zeros + 1.0)
-    return split(panels, np.where(np.any(sides, axis=1), 2, 1))
-
-
 def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panels:
     """Panels over the time that counts that end at `cuts` and at the edges.
 
@@ -154,49 +156,69 @@ def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panel
     cuts : increasing, shape (cuts,) [s]
     kinks : whether outputs have a kink there, shape (cuts,)
     """
-    segment, low, high, kinked = [], [], [], []
-    for k in range(edges.first, len(edges.times) - 1):
-        left, right = float(edges.times[k]), float(edges.times[k + 1])
-        near = APART * (right - left)
-        first, last = np.searchsorted(cuts, [left - near, right + near])
-        inner, kink = cuts[first:last], kinks[first:last]
-        free = (inner > left + near) & (inner < right - near)
-        places, on_kink = _distinct(inner[free], kink[free], near)
-        ends = np.concatenate([[0.0], (places - left) / (right - left), [1.0]])
-        at = np.concatenate(
-            [[bool(np.any(kink[inner <= left + near]))], on_kink, [bool(np.any(kink[inner >= right - near]))]]
-        )
-        kept = _apart_from_kinks(ends, at)
-        ends, at = ends[kept], at[kept]
-        segment.append(np.full(len(ends) - 1, k))
-        low.append(ends[:-1])
-        high.append(ends[1:])
-        kinked.append(np.stack([at[:-1], at[1:]], axis=1))
-    return _spans(np.concatenate(segment), np.concatenate(low), np.concatenate(high), np.concatenate(kinked))
+    whole = np.arange(edges.first, len(edges.times) - 1)
+    segment, fraction, inside = _places(edges, cuts)
+    lengths = np.diff(edges.times)
+    sides = np.zeros((len(lengths), 2), dtype=bool)  # whether a kink is at the low and at the high end
+    for shift in (-1, 0, 1):  # one beside an edge is at the ends of both intervals that it parts
+        k = np.clip(segment[kinks] + shift, 0, len(lengths) - 1)[:, None] + np.arange(2)
+        np.logical_or.at(sides, k[:, 0], np.abs(cuts[kinks][:, None] - edges.times[k]) <= APART * lengths[k[:, :1]])
+    inside &= segment >= edges.first
+    return _spans(
+        np.concatenate([whole, segment[inside], whole]),
+        np.concatenate([np.zeros(len(whole)), fraction[inside], np.ones(len(whole))]),
+        np.concatenate([sides[whole, 0], kinks[inside], sides[whole, 1]]),
+    )
 
 
-def _distinct(places: Array, kinks: NDArray[np.bool_], near: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Increasing places, those that are nearer to each other than `near` as one, which is a kink if one of them is."""
-    if not len(places):
-        return places, kinks
-    first = np.flatnonzero(np.diff(places, prepend=-np.inf) > near)
-    return places[first], np.logical_or.reduceat(kinks, first)
+def _places(edges: Edges, times: Array) -> tuple[NDArray[np.int_], Array, NDArray[np.bool_]]:
+    """Intervals of times, fractions of them, and whether these are apart from the edges."""
+    segment = np.clip(np.searchsorted(edges.times, times, side="right") - 1, 0, len(edges.times) - 2)
+    left, right = edges.times[segment], edges.times[segment + 1]
+    near = APART * (right - left)
+    return segment, (times - left) / (right - left), (times > left + near) & (times < right - near)
 
 
-def _apart_from_kinks(ends: Array, at: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _spans(segment: NDArray[np.int_], ends: Array, at: NDArray[np.bool_]) -> Panels:
+    """Panels between ends; those at a kink in two.
+
+    Parameters
+    ----------
+    segment, ends : intervals and fractions of them, 0 and 1 of each among them, in any order
+    at : whether a kink is there
+    """
+    order = np.lexsort((ends, segment))
+    segment, ends, at = segment[order], ends[order], at[order]
+    # those nearer to each other than APART are one, which is a kink if one of them is
+    first = np.flatnonzero((np.diff(ends, prepend=-1.0) > APART) | (np.diff(segment, prepend=-1) > 0))
+    segment, ends, at = segment[first], ends[first], np.logical_or.reduceat(at, first)
+    kept = _apart_from_kinks(segment, ends, at)
+    segment, ends, at = segment[kept], ends[kept], at[kept]
+    low = np.flatnonzero(np.diff(segment) == 0)
+    zeros, sides = np.zeros(len(low)), np.stack([at[low], at[low + 1]], axis=1)
+    panels = Panels(segment=segment[low], low=ends[low], high=ends[low + 1], kinked=sides, begin=zeros, end=zeros + 1.0)
+    return split(panels, np.where(np.any(sides, axis=1), 2, 1))
+
+
+def _apart_from_kinks(segment: NDArray[np.int_], ends: Array, at: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Ends to keep, shape of `ends`.
 
     Steps end on kinks, and the last step before one may be much shorter than those before it.  A function that grows
     like the square root of time at the kink is then not smooth in the longer step beside it, and one span of both
     steps, over which s is taken, resolves it.
     """
-    kept, last = np.ones(len(ends), dtype=bool), len(ends) - 1
-    for kink in np.flatnonzero(at).tolist():
-        for way in (-1, 1):
-            k = kink + way
-            while 0 < k < last and not at[k] and abs(ends[k] - ends[kink]) < NEAR_KINK * abs(ends[k + way] - ends[k]):
-                kept[k] = False
-                k += way
+    kept = np.ones(len(ends), dtype=bool)
+    apart = np.diff(segment, prepend=-1, append=-1) != 0
+    free = ~(at | apart[:-1] | apart[1:])  # neither a kink nor the end of an interval
+    for way in (-1, 1):
+        kink = np.flatnonzero(at)
+        place = np.clip(kink + way, 0, len(ends) - 1)
+        while len(place):
+            kink, place = kink[free[place]], place[free[place]]
+            near = np.abs(ends[place] - ends[kink]) < NEAR_KINK * np.abs(ends[place + way] - ends[place])
+            kink, place = kink[near], place[near]
+            kept[place] = False
+            place = place + way
     return kept
 
 
@@ -251,7 +273,7 @@ def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, N
 
     Parameters
     ----------
-    signals : at the nodes of the panels, smooth in each, shape (4 panels, columns)
+    signals : at the nodes of the panels, smooth in each, shape (panels, 4, columns)
 
     Returns
     -------
@@ -259,28 +281,67 @@ def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, N
     """
     left, right = edges.times[panels.segment], edges.times[panels.segment + 1]
     times = left[:, None] + panels.at(BETWEEN)[0] * (right - left)[:, None]
-    values = _TO_BETWEEN @ signals.reshape(len(panels), len(GAUSS), -1)
-    return times.ravel(), np.repeat(np.arange(len(panels)), len(BETWEEN)), values.reshape(times.size, -1)
+    values = (_TO_BETWEEN @ signals).reshape(times.size, signals.shape[2])
+    return times.ravel(), np.repeat(np.arange(len(panels)), len(BETWEEN)), values
+
+
+def bounds(signals: Array) -> tuple[Array, Array]:
+    """Least and largest values that signals may have at the places of `interpolated`, shape (panels, columns) each.
+
+    Parameters
+    ----------
+    signals : at the nodes of the panels, shape (panels, 4, columns)
+    """
+    # in pairs: a reduction over so few is several times slower
+    low = np.minimum(signals[:, :2], signals[:, 2:])
+    high = np.maximum(signals[:, :2], signals[:, 2:])
+    low, high = np.minimum(low[:, 0], low[:, 1]), np.maximum(high[:, 0], high[:, 1])
+    beyond = _BEYOND * (high - low)
+    return low - beyond, high + beyond
 
 
 def cut_at(panels: Panels, edges: Edges, times: Array) -> Panels:
-    """The same panels, cut at kinks."""
+    """The same panels, cut at kinks; those that are not near to one keep their bits."""
     if not len(times):
         return panels
-    left, right = edges.times[panels.segment], edges.times[panels.segment + 1]
-    ends = left + panels.at(np.ones(1))[0][:, 0] * (right - left)
-    every = np.concatenate([ends, times])
-    kinks = np.concatenate([panels.kinked[:, 1] & (panels.end == 1.0), np.ones(len(times), dtype=bool)])
-    order = np.argsort(every, kind="stable")
-    return panels_between(edges, every[order], kinks[order])
+    last, first = panels.end == 1.0, np.diff(panels.segment, prepend=-1) > 0
+    ends = np.where(last, panels.high, panels.at(np.ones(1))[0][:, 0])
+    segment, fraction, inside = _places(edges, times)
+    return _spans(
+        np.concatenate([panels.segment[first], panels.segment, segment[inside]]),
+        np.concatenate([panels.low[first], ends, fraction[inside]]),
+        np.concatenate(
+            [panels.kinked[first, 0], panels.kinked[:, 1] & last, np.ones(np.count_nonzero(inside), dtype=bool)]
+        ),
+    )
 
 
 def plan_of(panels: Panels, edges: Edges) -> NodePlan:
-    """Nodes of Gauss's rule in each panel, and both sides of each edge."""
+    """Nodes of Gauss's rule in each panel, and both sides of each edge, in order of time."""
     place, rate = panels.at(GAUSS)
     whole = np.arange(edges.first, len(edges.times) - 1)
-    sides = np.concatenate([np.zeros(len(whole)), np.ones(len(whole))])
-    segment = np.concatenate([np.repeat(panels.segment, len(GAUSS)), whole, whole]).astype(np.int_)
-    fraction = np.concatenate([place.ravel(), sides])
-    weight = np.concatenate([(WEIGHTS * rate).ravel(), 0.0 * sides])
-    return ordered_plan(segment, fraction, weight)
+    count = len(GAUSS) * len(panels) + 2 * len(whole)
+    segment, fraction, weight = np.empty(count, dtype=np.int_), np.empty(count), np.zeros(count)
+    inner = inner_nodes(panels)
+    segment[inner], fraction[inner], weight[inner] = panels.segment[:, None], place, WEIGHTS * rate
+    for side in (0.0, 1.0):
+        ends = np.searchsorted(panels.segment, whole, side="right" if side else "left") * len(GAUSS)
+        ends += 2 * np.arange(len(whole)) + int(side)
+        segment[ends], fraction[ends] = whole, side
+    return NodePlan(segment=segment, fraction=fraction, weight=weight)
+
+
+def inner_nodes(panels: Panels) -> NDArray[np.int_]:
+    """Places of the nodes of Gauss's rule in a plan of panels, shape (panels, 4)."""
+    sides = 2 * (panels.segment - panels.segment[:1]) + 1
+    return (len(GAUSS) * np.arange(len(panels)) + sides)[:, None] + np.arange(len(GAUSS))
+
+
+def same_panels(panels: Panels, known: Panels) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Panels that are among others of the same intervals, to the bit: their places in both."""
+    place = [one.segment + one.at(np.zeros(1))[0][:, 0] for one in (panels, known)]
+    at = np.minimum(np.searchsorted(place[1], place[0]), len(known) - 1)
+    same = np.all(panels.kinked == known.kinked[at], axis=1)
+    for name in ("segment", "low", "high", "begin", "end"):
+        same &= getattr(panels, name) == getattr(known, name)[at]
+    return np.flatnonzero(same), at[same]

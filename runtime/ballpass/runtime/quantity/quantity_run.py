@@ -193,7 +193,7 @@ class QuantityRun:
             for one in some:
                 count = len(one.nodes)
                 channels = self._channels.only(channels_of(one.layout.items))
-                signals = channels.along(part_of_track(track, first, first + count), run.numbers, chain)
+                signals = channels.along(part_of_track(track, slice(first, first + count)), run.numbers, chain)
                 first += count
                 view = View(
                     run=run,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import casadi
@@ -24,7 +24,7 @@ from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.jacobian import rows_of
-from ballpass.runtime.quantity.nodes import Edges, Nodes
+from ballpass.runtime.quantity.nodes import Edges, Nodes, part_of_nodes
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import Samples, start_run
@@ -116,6 +116,9 @@ def follow(
     if still:
         empty = np.zeros((len(nodes), count))
         return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=u, segments=segments)
+    if kept is not None and np.all(nodes.t[1:] >= nodes.t[:-1]):
+        x = stepper_for(model, run.kinks).read(kept, nodes.t)
+        return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments)
     times, back = np.unique(nodes.t, return_inverse=True)
     if kept is not None:
         x = stepper_for(model, run.kinks).read(kept, times)[back]
@@ -144,12 +147,10 @@ def follow(
     return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments, growth=growth)
 
 
-def part_of_track(track: Track, first: int, last: int) -> Track:
-    """Nodes `first` ... `last` of a track, the last one excluded."""
-    part = slice(first, last)
-    nodes = Nodes(**{item.name: getattr(track.nodes, item.name)[part] for item in fields(Nodes)})
-    names = ("x", "slope", "local", "u")
-    return replace(track, nodes=nodes, **{name: getattr(track, name)[part] for name in names})
+def part_of_track(track: Track, part: slice) -> Track:
+    """Some of the nodes of a track."""
+    arrays = {name: getattr(track, name)[part] for name in ("x", "slope", "local", "u")}
+    return replace(track, nodes=part_of_nodes(track.nodes, part), **arrays)
 
 
 def depends(model: LoadedModel, output: str, argument: str) -> list[int]:

@@ -174,6 +174,8 @@ class KeptSteps:
     @property
     def all(self) -> np.ndarray:
         """Those of the whole run, shape (steps, numbers)."""
+        if len(self.parts) == 1:
+            return self.parts[0]
         return np.concatenate([np.empty((0, self.numbers)), *self.parts])
 
 
