@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,11 @@ def test_run_says_what_more_turns_change_and_settles_on_request(
         refused = run("--turns", *wrong)
         assert refused.exit_code == 2
         assert "--turns" in refused.stderr
+
+
+def test_a_ring_at_rest_has_settled(make_model: Callable[..., Model]) -> None:
+    """Without load the ring stops in its clearance; velocities of 1e-45 m/s were extremes of the start."""
+    idle = {"loads.weight.force.y": 0.0, "loads.unbalance.mass": 0.0}
+    found = make_model("rotor").settle(parameters=idle, transient=50)
+    assert found.settled
+    assert (found.turns, found.dropped) == (128, 0)

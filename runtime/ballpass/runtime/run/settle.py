@@ -123,7 +123,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
             "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
             "are meant, without settle."
         )
-    going, counter = start_reducing(run, channel_names(model.manifest)), _counter(model)
+    going, counter, noise = start_reducing(run, channel_names(model.manifest)), _counter(model), tolerated(run)
     going.go_on()
     before, lost = going.take(), 0
     while True:
@@ -132,8 +132,8 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
         later = going.take()
         found = joined(before, later)
         assert found is not None
-        changes = changed(before, found, counter)
-        of_start = bool(extremes_of_start(before, later, counter))
+        changes = changed(before, found, noise, counter)
+        of_start = bool(extremes_of_start(before, later, noise, counter))
         settled = _settled(changes) and not of_start
         if settled or 2 * turns > most:
             return Settled(reductions=found, turns=turns - lost, settled=settled, changes=changes, dropped=lost)
@@ -218,8 +218,9 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     later = going.take()
     found = joined(early, later)
     assert found is not None
-    changes = changed(few, found, counter)
-    first = extremes_of_start(few, later, counter)
+    noise = tolerated(longer)
+    changes = changed(few, found, noise, counter)
+    first = extremes_of_start(few, later, noise, counter)
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
 
 
@@ -246,27 +247,36 @@ def _counter(model: LoadedModel) -> str:
     return "" if mechanism is None else mechanism.angle
 
 
-def changed(few: Reductions, many: Reductions, counter: str = "") -> dict[str, tuple[float, float]]:
-    """Change of the extremes of each channel but the `counter`, over its range, and of its rms [1]."""
+def tolerated(run: Run) -> dict[str, float]:
+    """What steps may be off by in each state: of a ring that has come to rest no digit is left."""
+    return dict(zip(run.model.states, (run.rtol * run.magnitude).tolist(), strict=True))
+
+
+def changed(
+    few: Reductions, many: Reductions, noise: Mapping[str, float], counter: str = ""
+) -> dict[str, tuple[float, float]]:
+    """Change of extremes over the range of each channel but the `counter`, and of its rms [1]; none within `noise`."""
     found = {}
     for name, less in few.items():
         if name == counter:
             continue
-        more, span = many[name], many[name].range
+        more, span, least = many[name], many[name].range, noise.get(name, 0.0)
         peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
-        found[name] = (peak / span if span > 0.0 else 0.0, abs(less.rms / more.rms - 1.0) if more.rms > 0.0 else 0.0)
+        mean = abs(less.rms / more.rms - 1.0) if abs(less.rms - more.rms) > least and more.rms > 0.0 else 0.0
+        found[name] = (peak / span if peak > least and span > 0.0 else 0.0, mean)
     return found
 
 
 def extremes_of_start(
-    few: Reductions, later: Reductions, counter: str = ""
+    few: Reductions, later: Reductions, noise: Mapping[str, float], counter: str = ""
 ) -> dict[str, tuple[str, float, float, float]]:
-    """Extremes that later turns do not come near, as `Settled.first`; not of the `counter`."""
+    """Extremes that later turns do not come near, as `Settled.first`; not of the `counter`, and none within `noise`."""
     found = {}
     for name, first in few.items():
         behind = later[name]
         up, down = first.maximum - behind.maximum, behind.minimum - first.minimum
-        if name != counter and max(up, down) > START * max(behind.range, max(up, down)):
+        missed = max(up, down)
+        if name != counter and missed > max(START * behind.range, noise.get(name, 0.0)):
             most = ("max", first.maximum_time, first.maximum, behind.maximum)
             found[name] = most if up >= down else ("min", first.minimum_time, first.minimum, behind.minimum)
     return found
