@@ -128,7 +128,7 @@ def test_a_load_slower_than_all_turns_is_not_settled(slow: Model) -> None:
     """It begins at 100 N and comes to 1900 N after an hour and a half."""
     slower = {"loads.slow.frequency": 1e-4}
     assert not slow.life(parameters=slower).states[0].settled
-    with pytest.raises(RequestError, match="slowest harmonic load takes 500000 turns"):
+    with pytest.raises(RequestError, match="slowest harmonic load, or beat, takes 500000 turns"):
         slow.settle(parameters=slower)
 
 
