@@ -21,7 +21,7 @@ from ballpass.runtime.run.beats import beats
 from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats
+from ballpass.runtime.run.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats, tolerated
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -135,10 +135,10 @@ def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
     slow = [one for one in beats(model.manifest, values) if one.period > turns * run.turn]
     if not slow or not repeats(model, values, run.start):
         return []
-    here = reduced(run)
+    here, noise = reduced(run), tolerated(run)
     for beat in slow:
         there = reduced(replace(run, numbers=model.numbers({**run.numbers.parameters, **beat.half})))
-        changes = changed(here, there)
+        changes = changed(here, there, noise)
         name = max(changes, key=lambda one: max(changes[one][0] / PEAKS, changes[one][1] / MEANS))
         peak, mean = changes[name]
         if peak <= PEAKS and mean <= MEANS:

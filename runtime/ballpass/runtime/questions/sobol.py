@@ -324,7 +324,7 @@ def sobol(
     kept = []
     for one in limits:
         column = base[:, names.index(one.quantity)]
-        known = column[np.isfinite(column)]
+        known = column[~np.isnan(column)]  # an infinite life is one
         hits = int(np.count_nonzero(known <= one.limit if one.upper else known >= one.limit))
         low, high = wilson(hits, len(known))
         factor, unit = table_unit(one.unit)
