@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -11,6 +12,7 @@ from scipy.stats import norm, sobol_indices, uniform
 from scipy.stats.qmc import Sobol
 
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.ask import drawn_members
 from ballpass.runtime.ask.variance_shares import VarianceShare, variance_shares, wilson
 
 CLEARANCE = "bearing.clearance"
@@ -85,6 +87,24 @@ def test_shares_of_the_few_members_that_have_results_are_a_fault(rotor: Model) -
         assert found.failed > 0.05 * found.members
         assert bool(found.report().fault) == ends
     assert rotor.sobol(load, of, cycles=2, transient=1, samples=64, indices=False, progress=False).failed in (63, 64)
+
+
+@pytest.mark.filterwarnings("error")
+def test_infinite_lives_keep_a_limit_and_are_said(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bearing that carries nothing lives for ever; one in four does here."""
+
+    def lives(_model: object, _inputs: object, members: np.ndarray, *_: object, **__: object) -> object:
+        return np.where(np.arange(len(members)) % 4 == 0, math.inf, 1.0 + members[:, 0]).reshape(-1, 1), ()
+
+    monkeypatch.setattr(drawn_members, "run_members", lives)
+    found = rotor.sobol("load.force.x=0 N:1 N", "life", limit="life >= 1.5 turns", samples=64, progress=False)
+    assert found.limits[0].kept == np.count_nonzero(np.isinf(found.values[:, 0]) | (found.base[:, 0] >= 0.5))
+    assert found.limits[0].members == 128
+    effects = rotor.morris("load.force.x=0 N:1 N", "life", base=16, progress=False)
+    assert effects.quantities[0].effects[0].rows == 12
+    for answer, count in ((found, "48 of 192"), (effects, "8 of 32")):
+        (said,) = answer.report().warnings
+        assert said == f"life is infinite in {count} members, which its means and shares leave out."
 
 
 @pytest.mark.long

@@ -107,6 +107,21 @@ def fault_of(failed: int, members: int, known: bool) -> str:
     return ""
 
 
+def infinite_words(names: Sequence[str], values: np.ndarray) -> tuple[str, ...]:
+    """Warnings about infinite values, as lives of bearings that carry nothing: means and shares leave them out.
+
+    Parameters
+    ----------
+    values : of the quantities, shape (members, quantities)
+    """
+    counts = np.count_nonzero(np.isinf(values), axis=0).tolist()
+    return tuple(
+        f"{name} is infinite in {count} of {len(values)} members, which its means and shares leave out."
+        for name, count in zip(names, counts, strict=True)
+        if count
+    )
+
+
 def values_of(inputs: Mapping[str, Distribution], shares: np.ndarray) -> np.ndarray:
     """Values of the inputs from shares of smaller ones, shape (members, inputs)."""
     return np.stack([one.values(share) for one, share in zip(inputs.values(), shares.T, strict=True)], axis=1)

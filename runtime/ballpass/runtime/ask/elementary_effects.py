@@ -1,6 +1,6 @@
 """Elementary effects of inputs (Morris 1991): how much a result changes where one input moves by half of its values.
 
-In: results of members, NaN for those without.  Out: `ElementaryEffect`.
+In: results of members, NaN for those without; infinite ones are left out as well.  Out: `ElementaryEffect`.
 
 Each base member has one further member for each input, whose share of smaller values is moved by a half: the radial
 design of Campolongo, Saltelli and Cariboni 2011 with one step.
@@ -66,8 +66,8 @@ def elementary_effects(shares: np.ndarray, base: np.ndarray, other: np.ndarray, 
     random = np.random.default_rng(seed)
     found = []
     for column, one in zip(shares.T, other, strict=True):
-        changes = (one - base) / ((column + STEP) % 1.0 - column)
-        changes = changes[np.isfinite(changes)]
+        known = np.isfinite(one) & np.isfinite(base)
+        changes = (one[known] - base[known]) / ((column + STEP) % 1.0 - column)[known]
         if len(changes) < 2:
             nan, rows = math.nan, len(changes)
             found.append(ElementaryEffect(size=nan, size_low=nan, size_high=nan, mean=nan, deviation=nan, rows=rows))

@@ -85,17 +85,35 @@ def _read(
 ) -> Limit:
     name, sign, written = limited(option, text)
     quantity = parse_quantity_name(manifest, name)
-    unit, hours = quantity.unit, re.fullmatch(r"(\S+?)\s*h", written)
+    unit = quantity.unit
     try:
-        if unit == "turns" and hours:
-            value = float(hours[1])
-            if model is not None:
-                value *= 3600.0 * _speed(model, option, quantity.channel, parameters, varied) / TURN
+        if unit == "turns":
+            value = _turns(written, model, option, quantity.channel, parameters, varied)
         else:
-            value = parse_quantity(written, unit) if unit not in ("", "1") else float(written)
-    except (QuantityError, ValueError) as error:
+            value = parse_quantity(written, unit or "1")
+    except QuantityError as error:
         raise RequestError(f"{option} {name}: {error}") from None
     return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)
+
+
+def _turns(
+    written: str,
+    model: LoadedModel | None,
+    option: str,
+    channel: str,
+    parameters: Mapping[str, float],
+    varied: Sequence[str],
+) -> float:
+    """A life, given in hours or turns [turns]."""
+    match = re.fullmatch(r"(\S+?)\s*(h|turns)", written)
+    if match is None:
+        raise RequestError(
+            f'{option}: {written!r:.80} is no life. Give hours or turns, as in "20000 h" or "1e9 turns".'
+        )
+    value = parse_quantity(match[1], "1")
+    if match[2] == "h" and model is not None:
+        value *= 3600.0 * _speed(model, option, channel, parameters, varied) / TURN
+    return value
 
 
 def _speed(

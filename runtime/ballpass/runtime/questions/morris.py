@@ -65,6 +65,7 @@ class MorrisAnswer(ShortRepr, Reported):
     quantities : effects on each
     seed, members : seed, members in all
     failed : members without results, and `fault` of the first
+    infinite : quantities that are infinite in some members, in words
 
     Examples
     --------
@@ -82,6 +83,7 @@ class MorrisAnswer(ShortRepr, Reported):
     members: int
     failed: int
     fault: str
+    infinite: tuple[str, ...]
 
     def _report(self) -> Report:
         from ballpass.runtime.ask.drawn_members import fault_of
@@ -112,7 +114,7 @@ class MorrisAnswer(ShortRepr, Reported):
                 )
             )
             records += [{"quantity": one.name, "input": name, **asdict(effect)} for name, effect in ranked]
-        warned = []
+        warned = [*self.infinite]
         if self.failed:
             warned.append(
                 f"{self.failed} of {self.members} members have no result, and were left out with those that they are "
@@ -173,7 +175,14 @@ def morris(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_members, values_of, words_of
+    from ballpass.runtime.ask.drawn_members import (
+        check_count,
+        infinite_words,
+        read_inputs,
+        run_members,
+        values_of,
+        words_of,
+    )
     from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
     from ballpass.runtime.quantity.grammar import quantities_of
 
@@ -209,4 +218,5 @@ def morris(
         members=len(values),
         failed=len(faults),
         fault=faults[0] if faults else "",
+        infinite=infinite_words(names, values),
     )

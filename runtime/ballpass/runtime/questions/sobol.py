@@ -126,6 +126,7 @@ class SobolAnswer(ShortRepr, Reported):
     limits : how many members keep each
     samples, seed, members : base samples, seed, members in all
     failed : members without results, and `fault` of the first
+    infinite : quantities that are infinite in some members, in words
     base : values of the inputs of the base members, shape (base members, inputs)
     values : of the quantities there, NaN for members without results, shape (base members, quantities)
 
@@ -146,6 +147,7 @@ class SobolAnswer(ShortRepr, Reported):
     members: int
     failed: int
     fault: str
+    infinite: tuple[str, ...]
     base: np.ndarray
     values: np.ndarray
 
@@ -183,7 +185,7 @@ class SobolAnswer(ShortRepr, Reported):
                 f"{limit.words}: kept by {limit.kept} of {limit.members} members, {100.0 * limit.share:.4g} % (95 % "
                 f"interval {100.0 * limit.low:.4g} to {100.0 * limit.high:.4g} %)"
             )
-        warned = []
+        warned = [*self.infinite]
         if self.failed:
             low, high = wilson(self.failed, self.members)
             warned.append(
@@ -273,7 +275,14 @@ def sobol(
     """
     from scipy.stats.qmc import Sobol
 
-    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_members, values_of, words_of
+    from ballpass.runtime.ask.drawn_members import (
+        check_count,
+        infinite_words,
+        read_inputs,
+        run_members,
+        values_of,
+        words_of,
+    )
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.variance_shares import variance_shares, wilson
     from ballpass.runtime.quantity.grammar import quantities_of
@@ -341,6 +350,7 @@ def sobol(
         members=len(values),
         failed=len(faults),
         fault=faults[0] if faults else "",
+        infinite=infinite_words(names, values),
         base=np.concatenate(rows[:2]),
         values=base,
     )
