@@ -183,10 +183,11 @@ class Optimum(ShortRepr, Reported):
             said.append("held by: the end of the given range at which the least value lies; beyond it, it is smaller")
         for limit in self.limits:
             its, its_unit = table_unit(limit.unit)
+            otherwise = "not kept" if limit.beyond > ACTIVE else "not active"
             multiplier = f"active, multiplier {limit.multiplier * factor / its:.4g} {unit}/({its_unit})"
             said.append(
                 f"{limit.quantity} is {its * limit.value:.6g} {its_unit}, limit {its * limit.limit:.6g}: "
-                + (multiplier if limit.active else "not active")
+                + (multiplier if limit.active else otherwise)
             )
         if self.tolerances:
             from ballpass.runtime.certify.worst_values import FURTHER
@@ -214,7 +215,7 @@ class Optimum(ShortRepr, Reported):
         if wrong:
             fault = f"Slopes by {', '.join(wrong)} disagree with the second route: this need not be the least value."
         elif broken:
-            fault = f"No values within the bounds keep the limit of {', '.join(broken)}."
+            fault = f"The search found no values within the bounds that keep the limit of {', '.join(broken)}."
         elif not self.converged:
             fault = "The search did not end by itself. Give more starts, narrower bounds, or another search: slsqp."
         warned = []
