@@ -160,6 +160,12 @@ def test_lines_of_the_shaft_are_at_its_frequency_and_not_a_sample_below(make_mod
     assert found.position[found.highest[0]] == pytest.approx(500.0 / 60.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("scaling", ["amplitude", "power"])
+def test_a_force_that_is_one_sine_has_one_line(make_model: Callable[..., Model], scaling: str) -> None:
+    """Nine more were rounding, 1e-14 N."""
+    assert make_model("rotor").spectrum("load.x", scaling=scaling).names == ("shaft",)
+
+
 @pytest.mark.long
 def test_bearings_are_heard_where_they_move_something(make_model: Callable[..., Model]) -> None:
     one_way, two_way = make_model("punching_press"), make_model("punching_press_two_way")

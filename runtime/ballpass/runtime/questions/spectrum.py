@@ -34,6 +34,9 @@ WIDTHS = 3.0
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
+#: Lines below this share of the highest are rounding, in amplitude [1].
+ROUNDING = 1e-13
+
 #: Samples of the window whose reading between two lines is computed, and the least reading of which nothing is said.
 SAMPLES = 1000
 LEAST_READING = 0.99
@@ -415,7 +418,7 @@ def spectrum(
         height=height,
         height_unit=height_unit,
         resolution=resolution,
-        highest=_peaks(height, top),
+        highest=_peaks(height, top, ROUNDING if height_unit == unit else ROUNDING**2),
         marks=() if changing and not orders else marks,
         statistics=diagnosis(signal),
         solution=solution,
@@ -484,8 +487,13 @@ def _angle(solution: Solution) -> np.ndarray:
     return np.asarray(speed * solution.t)
 
 
-def _peaks(height: np.ndarray, top: int) -> tuple[int, ...]:
-    """Places of the highest local maxima, highest first; without the line of frequency zero and its neighbour."""
+def _peaks(height: np.ndarray, top: int, least: float) -> tuple[int, ...]:
+    """Places of the highest local maxima, highest first; without the line of frequency zero and its neighbour.
+
+    Parameters
+    ----------
+    least : share of the highest line below which others are rounding [1]
+    """
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:])) + 1
-    inner = inner[inner > 1]
+    inner = inner[(inner > 1) & (height[inner] > least * np.max(height))]
     return tuple(int(k) for k in inner[np.argsort(height[inner])[::-1][:top]])
