@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ballpass.runtime import KinkWarning, Model, QuantityFunction, RequestError
+from ballpass.runtime import KinkWarning, Model, QuantityFunction, RequestError, UnknownValueWarning
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
@@ -409,3 +409,19 @@ def test_lives_of_two_bearings_have_the_same_bits_in_runs_and_members(make_model
     width = "bearings.pulley.clearance"
     many = model.simulate_many({width: [model.parameters[width]] * 2}, names, **options)
     assert {name: many[name].tolist() for name in names} == {name: [value] * 2 for name, value in alone.items()}
+
+
+def test_where_an_angle_jumps_at_an_edge_its_mean_does_not_move_with_the_edge(make_model: Callable[..., Model]) -> None:
+    """The jump was taken for one that the window moves: -2 pi over a turn, where zero is right."""
+    angle, window = "mechanism.driver.start_angle", "mechanism.forces.punch.window.start"
+    model = make_model("punching_press", ('"drive_torque"]', '"drive_torque", "drive_angle", "body.crank.*"]'))
+    at, span = {window: math.pi}, {"cycles": 2, "transient": 0}
+    means = ["mean:body.crank.angle", "rms:body.crank.angle"]
+    found = model.sensitivity(means, window, parameters=at, check=False, **span)
+    assert all(pair.derivative == pytest.approx(0.0, abs=1e-12) for pair in found.pairs)
+    start = QuantityFunction(model, "mean:drive_angle", [angle, "mechanism.driver.speed"], **span)
+    with pytest.warns(UnknownValueWarning, match="the angle jumps by a turn at an edge"):
+        by_start, by_speed = start.jacobian([0.0, 52.0])
+    assert math.isnan(by_start)  # other to the one side than to the other where the run is not of whole turns
+    assert by_speed == pytest.approx(0.0, abs=1e-12)
+    assert start.jacobian([0.1, 52.0]) == pytest.approx([0.0, 0.0], abs=1e-12)

@@ -368,7 +368,9 @@ class QuantityFunction:
                 if tell is not None:
                     tell(len(found) / len(rows))
         each = [(self.of[k], row, item) for row, one in zip(rows, found, strict=True) for k, item in one.items()]
-        nan = [(name, row, " ".join(item.notes)) for name, row, item in each if np.isnan(item.value)]
+        nan = [
+            (name, row, " ".join(item.notes)) for name, row, item in each if np.isnan([item.value, *item.slope]).any()
+        ]
         self._warn(UnknownValueWarning, nan)
         self._warn(KinkWarning, [(name, row, item.kink) for name, row, item in each if item.kink])
         return [[one[k] for k in self._all] for one in found]

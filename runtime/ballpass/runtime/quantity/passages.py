@@ -17,7 +17,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import APART, crossings
-from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges, place
+from ballpass.runtime.quantity.nodes import Edges, fixed_nodes, make_edges, place
 from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
 from ballpass.runtime.run import driver_angle
@@ -225,6 +225,46 @@ def wrap_slopes(
     return np.asarray(-angle.along(seen, run.numbers, chain)[angle.channels[0]].slope[:, 0] / rate)
 
 
+def jumps_at_edges(
+    run: Run,
+    track: Track,
+    edges: Edges,
+    angle: ChannelValues,
+    chain: Chain,
+    sensitivity_rtol: float,
+    *,
+    still: bool,
+) -> tuple[Edges, NDArray[np.bool_]]:
+    """Edges where those at which an angle jumps by a turn move with the jump, and directions in which they do not.
+
+    An angle that follows from time alone knows nothing of other edges than the run's ends.
+
+    Parameters
+    ----------
+    edges : without those of `find_wraps`
+
+    Returns
+    -------
+    edges, and whether the jump leaves an edge, shape (directions,)
+    """
+    at = jumps_at(angle.channels[0])
+    assert at is not None  # it is an angle
+    seen = _there(run, track, edges.times, chain, sensitivity_rtol, still=still)
+    value, rate = angle.with_rates(seen, run.numbers)
+    order = np.arange(len(edges.times))
+    jump = (np.abs(np.exp(1j * (value[:, 0] - at)) - 1.0) <= APART * run.duration * np.abs(rate[:, 0])) & (
+        order >= edges.first
+    )
+    if not np.any(jump):
+        return edges, np.zeros(len(chain.names), dtype=bool)
+    slopes = edges.slopes.copy()
+    slopes[jump] = -angle.along(seen, run.numbers, chain)[angle.channels[0]].slope[jump, 0] / rate[jump]
+    free = jump & still & (order > edges.first) & (order < order[-1])
+    leaves = jump[:, None] & ~free[:, None] & ~np.isclose(slopes, edges.slopes, rtol=1e-6, atol=0.0)
+    slopes[jump & ~free] = edges.slopes[jump & ~free]
+    return replace(edges, slopes=slopes), np.any(leaves, axis=0)
+
+
 def _there(
     run: Run,
     track: Track,
@@ -235,6 +275,6 @@ def _there(
     still: bool = False,
 ) -> Track:
     """The run at these fixed times."""
-    held = np.searchsorted(track.segments.times, times) - 1
+    held = np.clip(np.searchsorted(track.segments.times, times) - 1, 0, None)
     nodes = fixed_nodes(times, held, held, 0 if chain is None else len(chain.names))
     return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol, still=still)

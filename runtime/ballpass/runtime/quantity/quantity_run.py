@@ -38,7 +38,7 @@ from ballpass.runtime.quantity.nodes import (
     with_points,
 )
 from ballpass.runtime.quantity.panels import GAUSS, ROUGH
-from ballpass.runtime.quantity.passages import passage_slopes, wrap_slopes
+from ballpass.runtime.quantity.passages import jumps_at, jumps_at_edges, passage_slopes, wrap_slopes
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.ratings.of_bearing import bearing_words
@@ -177,8 +177,8 @@ class QuantityRun:
         found, layouts = self._measure(run, self._moving, len(names))
         laid = []
         for layout in layouts:
-            edges = self._moving_edges(run, layout, chain, sensitivity_rtol)
-            laid += [_Differentiated(run, part, edges, chain) for part in _by_nodes(layout)]
+            edges, leaves = self._moving_edges(run, layout, chain, sensitivity_rtol)
+            laid += [_Differentiated(run, part, edges, chain, leaves) for part in _by_nodes(layout)]
         slopes: dict[str, Estimate] = {}
         growth = 0.0
         for still in (False, True):
@@ -203,7 +203,9 @@ class QuantityRun:
                     slopes=chain.derivative,
                     names=chain.names,
                 )
-                slopes |= {item.name: _evaluated(view, item) for item in one.layout.items}
+                slopes |= {
+                    item.name: _where_known(_evaluated(view, item), item, one.leaves) for item in one.layout.items
+                }
         estimates = []
         for item, plain in zip(self.quantities, found.estimates, strict=True):
             if item.name in slopes:
@@ -289,9 +291,16 @@ class QuantityRun:
             needed |= {(name, state) for name in EXTREMES for state in self.model.states}
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])
 
-    def _moving_edges(self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> Edges:
-        """Edges of a layout that move with the parameters."""
+    def _moving_edges(
+        self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float
+    ) -> tuple[Edges, NDArray[np.bool_]]:
+        """Edges of a layout that move with the parameters; see `jumps_at_edges`."""
         edges, track = make_edges(run, layout.segments, chain), layout.track
+        leaves = np.zeros(len(chain.names), dtype=bool)
+        if any(kind_of(item).integrates and jumps_at(item.channel) is not None for item in layout.items):
+            assert track is not None
+            angle = self._channels.only(channels_of(layout.items))
+            edges, leaves = jumps_at_edges(run, track, edges, angle, chain, sensitivity_rtol, still=layout.still)
         if len(layout.wraps):
             assert track is not None
             angle = self._channels.only(channels_of(layout.items))
@@ -301,7 +310,7 @@ class QuantityRun:
             assert track is not None
             slopes = passage_slopes(run, track, layout.passages, chain, sensitivity_rtol)
             edges = with_passages(edges, layout.passages.times, slopes)
-        return edges
+        return edges, leaves
 
     def _at_rest(self, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
         at_rest = kind_of(quantity).at_rest
@@ -312,8 +321,8 @@ class QuantityRun:
 class _Differentiated:
     """Nodes of a layout that move with the parameters, and the moments among them."""
 
-    def __init__(self, run: Run, layout: Layout, edges: Edges, chain: Chain) -> None:
-        self.layout, self.edges = layout, edges
+    def __init__(self, run: Run, layout: Layout, edges: Edges, chain: Chain, leaves: NDArray[np.bool_]) -> None:
+        self.layout, self.edges, self.leaves = layout, edges, leaves
         beside = {
             (item.name, kind): around(layout, layout.extremes[item.name, kind][0])
             for item in layout.items
@@ -347,6 +356,14 @@ def _evaluated(view: View, quantity: Quantity) -> Estimate:
     evaluate = kind_of(quantity).evaluate
     assert evaluate is not None  # all others are at rest
     return evaluate(view, quantity)
+
+
+def _where_known(found: Estimate, quantity: Quantity, leaves: NDArray[np.bool_]) -> Estimate:
+    """Without derivatives of an integral of an angle whose jump by a turn leaves an edge."""
+    if not (kind_of(quantity).integrates and np.any(leaves)):
+        return found
+    notes = (*found.notes, "the angle jumps by a turn at an edge of the run or of a load")
+    return replace(found, slope=np.where(leaves, np.nan, found.slope), notes=notes)
 
 
 def _with_moments(
