@@ -100,7 +100,8 @@ def _over_passes(view: View, prefix: str) -> View:
     nodes = view.nodes
     within = np.flatnonzero(nodes.weight).reshape(-1, len(GAUSS))
     outer, inner = (view.signals[prefix + place] for place in PLACES)
-    turned = WEIGHTS * ((outer.value - inner.value)[within, 0] @ RATE.T)
+    apart = np.unwrap((outer.value - inner.value)[within, 0])  # angles come back after a turn
+    turned = WEIGHTS * (apart @ RATE.T)
     moved = np.einsum("i,ij,pjd->pid", WEIGHTS, RATE, (outer.slope - inner.slope)[within, 0])
     weight, weight_slope = np.zeros_like(nodes.weight), np.zeros_like(nodes.weight_slope)
     weight[within], weight_slope[within] = np.abs(turned), np.sign(turned)[:, :, None] * moved
