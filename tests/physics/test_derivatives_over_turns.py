@@ -208,10 +208,3 @@ profile = "half-sine"
     expected = float(extrapolated(run, 2e-5))
     assert found == pytest.approx(expected, rel=5e-5, abs=0.0)
     assert float(function.jacobian(function.start).ravel()[0]) == pytest.approx(expected, rel=5e-5, abs=0.0)
-
-    states = {"cycles": 2.67, "samples_per_cycle": 100}
-    usual = model.sensitivities(ANGLE, **states)  # type: ignore[arg-type]
-    tight = model.sensitivities(ANGLE, **states, rtol=1e-12, sensitivity_rtol=1e-12)  # type: ignore[arg-type]
-    magnitudes = np.array(tight.solution.statistics.magnitudes)
-    off, size = (np.max(np.abs(x[1:, :, 0]) / magnitudes, axis=1) for x in (usual.x - tight.x, tight.x))
-    assert np.max(off / size) < 5e-6  # 2.5e-5 where it is relative to the largest

@@ -24,7 +24,7 @@ from ballpass.runtime.certify.derivative_runs import derivative_run, differentia
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 from ballpass.runtime.contract.arguments import typed_methods
-from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY, TOLERANCES
+from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name, wrong_unit
 from ballpass.runtime.many.ensemble import simulate_many
@@ -243,7 +243,7 @@ class QuantityFunction:
             wrt=self.wrt,
             request=self._request,
             rtol=self._slope_rtol,
-            sensitivity_rtol=SENSITIVITY * self._slope_rtol,
+            sensitivity_rtol=self._slope_rtol,
         )
         with shown_steps("differentiating", progress) as tell:
             return answer(self._model, self._numbers(given), replace(query, progress=tell))
@@ -399,11 +399,10 @@ class QuantityFunction:
         except IndexError:
             along = QuantityRun(self._model, quantities)
         run, _ = derivative_run(self._model, numbers, replace(self._request, rtol=self._slope_rtol))
-        own = SENSITIVITY * self._slope_rtol
         if self._chaos == "refuse":
-            found, _ = differentiate_unless_chaotic(along, run, self._request, self.wrt, own)
+            found, _ = differentiate_unless_chaotic(along, run, self._request, self.wrt, self._slope_rtol)
         else:
-            found, _ = differentiate(along, run, self.wrt, own)
+            found, _ = differentiate(along, run, self.wrt, self._slope_rtol)
         self._free[of].append(along)
         return found.estimates
 

@@ -35,7 +35,7 @@ from ballpass.runtime.certify.sensitivity_report import (
     SensitivityReport,
     ratio_unit,
 )
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -86,7 +86,7 @@ class Query:
     method: str = "auto"
     check: bool = True
     rtol: float = DERIVATIVE_RTOL
-    sensitivity_rtol: float = SENSITIVITY * DERIVATIVE_RTOL
+    sensitivity_rtol: float = DERIVATIVE_RTOL
     kinks: str | None = None
     agreement: float = AGREEMENT
     progress: Callable[[str, float], None] | None = None
@@ -143,7 +143,7 @@ def make_query(
         method=method,
         check=check,
         rtol=DERIVATIVE_RTOL if rtol is None else rtol,
-        sensitivity_rtol=SENSITIVITY * DERIVATIVE_RTOL if sensitivity_rtol is None else sensitivity_rtol,
+        sensitivity_rtol=DERIVATIVE_RTOL if sensitivity_rtol is None else sensitivity_rtol,
         kinks=None if kinks is None else check_kinks(kinks),
         agreement=AGREEMENT if agreement is None else agreement,
         progress=progress,

@@ -22,10 +22,6 @@ from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.request import check_memory
 
-#: Error allowed in a step of a derivative that has grown, relative to itself, over that of others: it may shrink again,
-#: as behind a spall to a thousandth of what it is within it, while its errors remain [1].
-GROWN = 0.1
-
 
 class Chain:
     """Derivatives of the numbers of a run along parameters, all but those of the states.
@@ -181,11 +177,10 @@ class Directions:
         Parameters
         ----------
         rtol : error allowed in a step, relative to the states' magnitudes over the parameters' scales (see
-            `ballpass.runtime.run.direction_scales`); `GROWN` of it relative to the derivative itself, where that is
-            more [1]
+            `ballpass.runtime.run.direction_scales`), or to the derivative itself where it is larger [1]
         magnitude : of the states, shape (states,)
         """
-        self._rtol = GROWN * rtol
+        self._rtol = rtol
         self._weight = self._blocked(self._scales(magnitude)[None, :] / (rtol * magnitude[:, None]))
 
     def _blocked(self, columns: np.ndarray) -> np.ndarray:

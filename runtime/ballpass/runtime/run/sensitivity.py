@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, LOOSEST_SENSITIVITY, SENSITIVITY, TOLERANCES
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
-from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.choose_method import differentiating_method
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.locating import jumping_laws, kinks_with_derivatives, refuse_jumps
 from ballpass.runtime.run.request import Request, tolerance
 from ballpass.runtime.run.simulate import simulate
@@ -38,7 +36,6 @@ class Sensitivities(ShortRepr):
     solution : the run itself
     names : parameters, in the order of the last axis
     x : derivative of each state at fixed time, shape (samples, states, parameters) [state's unit / parameter's unit]
-    sensitivity_rtol : tolerance of the derivatives that was taken [1]
 
     Examples
     --------
@@ -50,7 +47,6 @@ class Sensitivities(ShortRepr):
     solution: Solution
     names: tuple[str, ...]
     x: np.ndarray
-    sensitivity_rtol: float
 
     def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
         """Derivative of a state by a parameter, ``s["inner.y", "bearing.clearance"]``, shape (samples,).
@@ -101,15 +97,7 @@ def sensitivities(
 
     def prepare(samples: int) -> Directions:
         made.append(Directions(model, numbers, names, samples, kinks))
-        return made[-1]
+        return made[0]
 
-    while True:
-        try:
-            solution = simulate(model, numbers, replace(request, rtol=rtol, sensitivity_rtol=own), prepare)
-            x = made.pop().states(len(solution))
-            return Sensitivities(solution=solution, names=tuple(names), x=x, sensitivity_rtol=own)
-        except IntegrationError as error:
-            too_small = request.sensitivity_rtol is None and error.status is Status.STEP_TOO_SMALL
-            if not too_small or 10.0 * own > LOOSEST_SENSITIVITY:
-                raise
-            own *= 10.0
+    solution = simulate(model, numbers, replace(request, rtol=rtol, sensitivity_rtol=own), prepare)
+    return Sensitivities(solution=solution, names=tuple(names), x=made[0].states(len(solution)))
