@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -272,10 +273,11 @@ def test_derivatives_of_steps_that_end_on_kinks_reach_tolerances_that_others_do_
     model = make_model("crank_shaper")
     names = ["bearing.clearance", "mechanism.driver.speed", "bearing.ball_angle"]
 
-    def run(kinks: str | None, rtol: float) -> Sensitivities:
+    def run(kinks: str | None, rtol: float, sensitivity_rtol: float | None = None) -> Sensitivities:
         return model.sensitivities(
             *(names, 0.8),
             rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=100,
             kinks=kinks,
             method="stepper-dop853",  # type: ignore[arg-type]
@@ -291,7 +293,7 @@ def test_derivatives_of_steps_that_end_on_kinks_reach_tolerances_that_others_do_
     assert 2 * located.solution.statistics.steps < over.solution.statistics.steps
     assert np.max(np.abs(run(None, 1e-10).x - reference) / size) < 1e-5
     with pytest.raises(IntegrationError, match="step size fell"):
-        run("stepped-over", 1e-10)
+        run("stepped-over", 1e-10, 1e-9)  # named, it is not loosened
     for ask in (model.sensitivities, partial(model.sensitivity, "peak_ball_force")):
         with pytest.raises(RequestError, match="Did you mean 'located'"):
             ask("bearing.clearance", cycles=1, kinks="locate")  # type: ignore[operator]
@@ -322,3 +324,21 @@ window = { start = "267 deg", end = "280 deg" }
     assert np.all(np.abs(found[-1] - near[-1]) < 1e-4 * size)
     apart = {start: math.radians(268.0)}
     assert model.sensitivities("mechanism.forces.punch.window.end", cycles=1, parameters=apart).x.shape[2] == 1
+
+
+@pytest.mark.long
+def test_tolerance_is_loosened_where_steps_would_fall_below_the_resolution_of_time(
+    make_model: Callable[..., Model],
+) -> None:
+    """The toggle press with tangent damping, by the clearance of its knee."""
+    press, name = make_model("toggle_press"), "bearings.knee.clearance"
+    run: dict[str, Any] = {"cycles": 0.05, "samples_per_cycle": 100}
+    with pytest.raises(IntegrationError, match="a looser sensitivity_rtol may come through"):
+        press.sensitivities(name, **run, sensitivity_rtol=1e-10)
+    found = press.sensitivities(name, **run)
+    assert found.sensitivity_rtol > 1e-10
+    value, tight = press.parameters[name], {"rtol": 1e-12, "kinks": "located", "method": "stepper-dop853"}
+    above, below = (press.simulate(**run, **tight, parameters={name: value * (1.0 + h)}).x for h in (1e-5, -1e-5))
+    differences = (above - below) / (2e-5 * value)
+    off = np.abs(found.x[:, :, 0] - differences) / np.max(np.abs(differences), axis=0, initial=1e-300)
+    assert np.max(off) < 1e-5

@@ -325,7 +325,8 @@ class Model(PointModel, Questions):
         rtol : error allowed per step in the states.  Default: 1e-11, because derivatives lose digits
         sensitivity_rtol : the same in the derivatives, which take part in the choice of step sizes, relative to the
             states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to the derivative itself where
-            it is larger.  Default: ten times `rtol`
+            it is larger.  Default: ten times `rtol`; where steps would fall below the resolution of time ten times as
+            much, and so on up to 1e-6: see `Sensitivities.sensitivity_rtol`
         kinks : ``located``, the default, at any tolerance; ``stepped-over`` costs digits
         others : as for `simulate`
 

@@ -22,11 +22,8 @@ from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import Request, run_length
 from ballpass.runtime.run.resolve import SCALED_TURNS, Run, resolve
 from ballpass.runtime.run.segments import check_count
+from ballpass.runtime.run.sensitivity import loosened
 from ballpass.runtime.run.start import start_state
-
-#: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
-#: under laws whose slope is infinite at contact onset derivatives have singular rates there.
-LOOSEST = 1e-6
 
 #: Growth of a change of the start below which a motion is not chaotic: one of 1e-10 (`growth.TINY`) then changes the
 #: motion by 1e-6, far from what four digits bear.  Shipped scenes have 300 at most, chaotic ones 1e9 [1].
@@ -58,14 +55,7 @@ def differentiate(
     quantities: QuantityRun, run: Run, names: Sequence[str], sensitivity_rtol: float
 ) -> tuple[EvaluatedQuantities, float]:
     """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
-    tolerance = sensitivity_rtol
-    while True:
-        try:
-            return quantities.differentiate(run, names, tolerance), tolerance
-        except SimulationError:
-            if tolerance * 10.0 > max(LOOSEST, sensitivity_rtol):
-                raise
-            tolerance *= 10.0
+    return loosened(lambda tolerance: quantities.differentiate(run, names, tolerance), sensitivity_rtol)
 
 
 def differentiate_unless_chaotic(

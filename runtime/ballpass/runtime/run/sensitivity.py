@@ -6,18 +6,22 @@ step line by line at fixed step size, many parameters in one pass (`directions`)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, LOOSEST_SENSITIVITY, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.choose_method import differentiating_method
 from ballpass.runtime.run.directions import Directions
+from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.locating import jumping_laws, kinks_with_derivatives, refuse_jumps
+from ballpass.runtime.run.loop import RunFailed
 from ballpass.runtime.run.request import Request, tolerance
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
@@ -25,6 +29,8 @@ from ballpass.runtime.show.short import ShortRepr
 
 #: Method of runs with derivatives where laws jump.
 EXPLICIT = "stepper-dop853"
+
+Done = TypeVar("Done")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -36,6 +42,7 @@ class Sensitivities(ShortRepr):
     solution : the run itself
     names : parameters, in the order of the last axis
     x : derivative of each state at fixed time, shape (samples, states, parameters) [state's unit / parameter's unit]
+    sensitivity_rtol : tolerance of the derivatives that was taken [1]
 
     Examples
     --------
@@ -47,6 +54,7 @@ class Sensitivities(ShortRepr):
     solution: Solution
     names: tuple[str, ...]
     x: np.ndarray
+    sensitivity_rtol: float
 
     def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
         """Derivative of a state by a parameter, ``s["inner.y", "bearing.clearance"]``, shape (samples,).
@@ -91,13 +99,31 @@ def sensitivities(
     differentiating_method("sensitivities", request.method or model.manifest.run.method)
     if not names:
         raise RequestError("sensitivities: no parameter was named. Give the names of one or more parameters.")
-    made: list[Directions] = []
     rtol = DERIVATIVE_RTOL if request.rtol is None else tolerance("rtol", request.rtol)
-    own = min(SENSITIVITY * rtol, TOLERANCES[1]) if request.sensitivity_rtol is None else request.sensitivity_rtol
 
-    def prepare(samples: int) -> Directions:
-        made.append(Directions(model, numbers, names, samples, kinks))
-        return made[0]
+    def run(own: float) -> Sensitivities:
+        made: list[Directions] = []
 
-    solution = simulate(model, numbers, replace(request, rtol=rtol, sensitivity_rtol=own), prepare)
-    return Sensitivities(solution=solution, names=tuple(names), x=made[0].states(len(solution)))
+        def prepare(samples: int) -> Directions:
+            made.append(Directions(model, numbers, names, samples, kinks))
+            return made[0]
+
+        solution = simulate(model, numbers, replace(request, rtol=rtol, sensitivity_rtol=own), prepare)
+        x = made[0].states(len(solution))
+        return Sensitivities(solution=solution, names=tuple(names), x=x, sensitivity_rtol=own)
+
+    if request.sensitivity_rtol is not None:
+        return run(request.sensitivity_rtol)
+    return loosened(run, min(SENSITIVITY * rtol, TOLERANCES[1]))[0]
+
+
+def loosened(run: Callable[[float], Done], tightest: float) -> tuple[Done, float]:
+    """A run with derivatives at the tightest tolerance of these that the resolution of time allows; that tolerance."""
+    own = tightest
+    while True:
+        try:
+            return run(own), own
+        except (IntegrationError, RunFailed) as fault:
+            if fault.status is not Status.STEP_TOO_SMALL or own * 10.0 > LOOSEST_SENSITIVITY:
+                raise
+            own *= 10.0
