@@ -6,12 +6,15 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from ballpass.runtime import Model, Solution
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.summary import add_turns, summarize
 from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.app.summary_words import stands_out
@@ -21,6 +24,8 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.text import show, table_text
 from ballpass.runtime.run.settle import look_further
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +220,21 @@ def test_names_and_numbers_of_tables_are_whole_at_any_width(
     assert sum(name in line for line in lines) == 3
     assert " ".join(word for line in lines for word in line.split() if word in words.split()) == words
     assert all(any(number in line for line in lines) for number in numbers)
+
+
+@pytest.mark.long
+def test_a_quantity_that_is_no_finite_number_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """nan and inf stood alone."""
+    monkeypatch.chdir(tmp_path)
+    still = ["loads.unbalance.mass=0 kg", "loads.weight.force.y=0 N"]
+    words = ["run", str(SCENES / "rotor.toml"), "--no-figures"]
+    asked = [word for name in ("kurtosis:load.y", "life", "mean:load.y") for word in ("--of", name)]
+    done = CliRunner().invoke(app, [*words, *asked, *(word for one in still for word in ("--set", one))])
+    assert done.exit_code == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    assert "kurtosis (nan: the signal stands still)" in said
+    assert "shortest reading (inf: no ball carries a load)" in said
+    assert said.count("nan") == said.count("inf:") + 1 == 2
 
 
 def test_no_word_of_a_scene_is_read_as_a_picture_or_as_a_style() -> None:

@@ -35,6 +35,9 @@ COMMANDS = (
 )
 
 
+RUNNING_ONCE = ("life --cycles 22", "spectrum --of inner.x", "run --no-figures --error 1%")
+
+
 @pytest.fixture
 def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scene_text: Callable[..., str]) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -137,3 +140,25 @@ def test_a_void_start_of_a_run_that_counts_later_is_a_warning(make_model: Callab
     assert found.steady_reductions["ball.deflection"].maximum < 1e-4
     with pytest.raises(IntegrationError, match="a ball is flattened by"):
         model.simulate(1, transient=0, **given)
+
+
+@pytest.mark.filterwarnings("always::ballpass.runtime.UnusualWarning")
+@pytest.mark.parametrize("words", long_but(RUNNING_ONCE, RUNNING_ONCE[1]))
+def test_a_void_start_is_a_warning_of_every_command_that_runs_once(words: str, scene: Path) -> None:
+    """`run` and `simulate` alone had it."""
+    name, *rest = words.split()
+    done = CliRunner().invoke(app, [name, scene.name, *rest, "--set", "bearing.initial.inner_velocity.x=20m/s"])
+    assert done.exit_code == 0, done.stderr
+    assert " ".join(done.stderr.split()).count("Before the turns that count, t = 0.000204 s: bearing: a ball is") == 1
+
+
+def test_quantities_and_settling_warn_of_a_void_start(make_model: Callable[..., Model]) -> None:
+    model, thrown = make_model("varying_compliance"), {"bearing.initial.inner_velocity.x": 20.0}
+    runs: list[Callable[[], object]] = [
+        lambda: model.reduce(20, transient=19, parameters=thrown),
+        lambda: model.quantities("rms:inner.x", 20, transient=19, parameters=thrown),
+        lambda: model.settle(transient=19, parameters=thrown),
+    ]
+    for run in runs:
+        with pytest.warns(UnusualWarning, match=r"Before the turns that count, t = .* a ball is flattened by"):
+            run()

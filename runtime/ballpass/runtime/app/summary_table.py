@@ -6,7 +6,7 @@ In: what `summarize` gave.  Out: tables of a report.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.summary_words import row_place, row_words, written
@@ -131,13 +131,19 @@ def render_quantities(manifest: Manifest, found: Mapping[str, Mapping[str, Any]]
         ball = "" if one["ball"] is None else bearing_words(f"ball {one['ball']}", manifest.bearings, channel)
         value = written(one, "value", factor, " ") if "over_starts" in one else f"{factor * one['value']:z.6g}"
         rows.append((name, value, unit, ", ".join(filter(None, [time, ball]))))
-    heads, caption = ("quantity", "value", "unit", "at"), _quantities_words(manifest, found)
+    heads = ("quantity", "value", "unit", "at")
+    caption = _quantities_words(manifest, {name: one["value"] for name, one in found.items()})
     return ReportTable(title="Quantities", heads=heads, rows=rows, right=("value",), caption=caption)
 
 
-def _quantities_words(manifest: Manifest, names: Iterable[str]) -> str:
-    """What each quantity is, a line each."""
-    return "\n".join(f"{name}: {quantity_words(manifest, parse_quantity(manifest, name))}" for name in names)
+def _quantities_words(manifest: Manifest, values: Mapping[str, float]) -> str:
+    """What each quantity is, a line each, and why it is no finite number."""
+    why = {name: "" for name, value in values.items() if math.isfinite(value)}
+    why |= {name: " (nan: the signal stands still)" for name, value in values.items() if math.isnan(value)}
+    why |= {name: " (inf: no ball carries a load)" for name, value in values.items() if math.isinf(value)}
+    return "\n".join(
+        f"{name}: {quantity_words(manifest, parse_quantity(manifest, name))}{why[name]}" for name in values
+    )
 
 
 def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
@@ -156,7 +162,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
         heads=("quantity", *right, "unit"),
         rows=rows,
         right=right,
-        caption=_quantities_words(model.manifest, accuracy.of),
+        caption=_quantities_words(model.manifest, {name: accuracy.values[name] for name in accuracy.of}),
     )
 
 

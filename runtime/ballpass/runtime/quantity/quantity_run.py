@@ -232,7 +232,8 @@ class QuantityRun:
         if self._runs:
             stepper = stepper_for(run.model, run.kinks)  # compiled before it is timed
             steps_taken = KeptSteps(numbers=stepper.kept, check=partial(self._check_memory, directions))
-            sinks: list[Sink] = [ReductionRow(row=row), *([steps_taken] if noded else [])]
+            before = reduction_rows(self.model.manifest).empty(1, 0.0, ())[0]
+            sinks: list[Sink] = [ReductionRow(row=row, before=before), *([steps_taken] if noded else [])]
             going = start_run(run, sinks)
             begin = _now()
             going.go_on()

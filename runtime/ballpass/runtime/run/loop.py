@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,6 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.method_registry import CHOICE, STEPPERS
+from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.reduction_rows import HEAD, void_moment
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
@@ -280,7 +282,8 @@ class RunUnderWay:
     def _refuse_void(self) -> None:
         """Refuse results in which a ball is flattened as none can be, at the moment where it is most.
 
-        They are those behind the transient; all of a run that ends within it.
+        They are those behind the transient; all of a run that ends within it.  What is so in the transient alone is a
+        warning.
         """
         run, values = self.run, self.run.numbers.values
         for sink in self.sinks:
@@ -289,6 +292,10 @@ class RunUnderWay:
             within = not sink.row[HEAD.index("duration")] > 0.0
             row = sink.before if within and sink.before is not None else sink.row
             found = void_moment(run.model.manifest, values, row)
+            early = None if sink.before is None else void_moment(run.model.manifest, values, sink.before)
+            if found is None and early is not None:
+                text = f"Before the turns that count, t = {early[1]:.3g} s: {early[0]}"
+                warnings.warn(text, UnusualWarning, stacklevel=3)
             if found is not None:
                 why, time = found
                 there = start_run(replace(run, progress=None), [])

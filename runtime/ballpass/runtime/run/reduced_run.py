@@ -91,4 +91,5 @@ def start_reducing(run: Run, channels: Collection[str]) -> ReducedRun:
     """
     layout = reduction_rows(run.model.manifest)
     row = layout.empty(1, run.check_steady().start, layout.all_of(channels))[0]
-    return ReducedRun(going=start_run(run, [ReductionRow(row=row)]), row=row, channels=tuple(channels))
+    sink = ReductionRow(row=row, before=layout.empty(1, 0.0, ())[0])
+    return ReducedRun(going=start_run(run, [sink]), row=row, channels=tuple(channels))

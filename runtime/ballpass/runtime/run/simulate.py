@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import time as clocks
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -20,11 +19,10 @@ import numpy as np
 
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import DEFLECTION, reduction_rows, void_moment
+from ballpass.runtime.native.reduction_rows import DEFLECTION, reduction_rows
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
 from ballpass.runtime.run.casadi_run import integrate
@@ -87,10 +85,6 @@ def simulate(
             integrate(run, trajectory)
         if not reducing:
             _refuse_void(run, trajectory)
-        elif found := void_moment(model.manifest, numbers.values, rows[1]):
-            warnings.warn(
-                f"Before the turns that count, t = {found[1]:.9g} s: {found[0]}", UnusualWarning, stacklevel=4
-            )
     except (RunFailed, Interrupted) as end:
         failure = end
     last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial
