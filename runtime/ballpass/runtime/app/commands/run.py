@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -37,8 +37,11 @@ from ballpass.runtime.contract.options import (
 from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
+    from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
+    from ballpass.runtime.quantity.values import QuantityValue
     from ballpass.runtime.run.locating import Kinks
+    from ballpass.runtime.run.settle import Settled
     from ballpass.runtime.run.solution import Solution
     from ballpass.runtime.run.start import RunEnd
 
@@ -137,15 +140,9 @@ def run(
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
-        from ballpass.runtime.app.summary import add_turns, summarize
-        from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
-        from ballpass.runtime.app.summary_words import stands_out
-        from ballpass.runtime.app.transient_words import tables_left_out, transient_words
-        from ballpass.runtime.ask.peaks import run_of
-        from ballpass.runtime.report.report import Report
-        from ballpass.runtime.report.text import show as show_report
+        from ballpass.runtime.app.summary import add_turns
+        from ballpass.runtime.app.transient_words import tables_left_out
         from ballpass.runtime.run.locating import refuse_with_error
-        from ballpass.runtime.run.settle import look_further
 
         stages("read")
         formats = read_formats(format_)
@@ -167,11 +164,11 @@ def run(
             inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
         )
         stages("simulate")
+        length: dict[str, Any] = {"cycles": cycles, "duration": duration, "transient": transient}
+        given: dict[str, Any] = {"parameters": asked.overrides, "initial": start}
         solution = model.simulate(
-            cycles=cycles,
-            duration=duration,
-            transient=transient,
-            parameters=asked.overrides,
+            **length,
+            **given,
             method=method,
             rtol=rtol,
             kinks=cast("Kinks | None", kinks),
@@ -179,87 +176,22 @@ def run(
             progress=stages.fraction,
             error=error,
             of=of if error is not None else None,
-            initial=start,
         )
         # nobody asked for the turns of a transient that ballpass chose: they are most of such a file
-        chosen = not model.manifest.run.stated and (cycles, duration, transient) == (None, None, None)
+        chosen = not model.manifest.run.stated and not _said(length)
         if solution.nbytes > LARGE and not chosen:
             size = size_words(solution.nbytes)
             note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
-        growth = None
-        if solution.states and model.has_stepper:
-            growth = model.growth(
-                cycles,
-                duration=duration,
-                transient=transient,
-                parameters=asked.overrides,
-                rtol=solution.statistics.rtol,
-                initial=start,
-                of=of,
-            )
-        longer = None
-        if turns is not None:
-            taken = solution.statistics
-            longer = model.settle(
-                transient=transient,
-                parameters=asked.overrides,
-                method=taken.method,
-                rtol=taken.rtol,
-                initial=start,
-                kinks=cast("Kinks | None", taken.kinks),
-                progress=stages.fraction,
-            )
-            if not longer.settled:
-                warn(longer.words)
-            if growth is not None and growth.spread and longer.settled:  # of the turns whose numbers are printed
-                steady = longer.reductions
-                growth = model.growth(
-                    duration=steady.start + steady.duration - taken.begin,
-                    transient=steady.start / model.period(asked.overrides),
-                    parameters=asked.overrides,
-                    rtol=taken.rtol,
-                    initial=start,
-                )
-        else:
-            longer = look_further(model, model.numbers(asked.overrides), solution)
-            if longer is not None:
-                own = run_of(model, model.numbers(asked.overrides), solution)
-                own = replace(own, start=longer.reductions.start, transient_cycles=solution.transient_cycles)
-                length = (cycles, duration, transient)
-                for words in transient_words(model, own, longer, asked=length != (None, None, None)):
-                    warn(words)
-        if growth is not None and growth.words:
-            warn(growth.words)
+        growth, longer = _look_behind(model, solution, length, given, of, stages, settle=turns is not None)
         if chosen:
             for words in tables_left_out(model, model.numbers(asked.overrides).values):
                 warn(words)
         taken = solution.statistics
-        asked_for = (
-            model.quantities(
-                of,
-                cycles,
-                duration=duration,
-                transient=transient,
-                parameters=asked.overrides,
-                method=taken.method,
-                rtol=taken.rtol,
-                initial=start,
-                kinks=cast("Kinks | None", taken.kinks),
-            )
-            if of
-            else {}
-        )
+        method_taken: dict[str, Any] = {"method": taken.method, "rtol": taken.rtol, "kinks": taken.kinks}
+        quantities = model.quantities(of, **length, **given, **method_taken) if of else {}
         stages("write")
-        summary = summarize(model, solution, growth)
-        for words in summary["limits"]:
-            note(words)
-        if asked_for:
-            summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
-            for name, (mean, deviation) in (growth.asked if growth is not None else {}).items():
-                summary["quantities"][name]["over_starts"] = {"value": {"mean": mean, "std": deviation}}
+        summary = _summary(model, solution, growth, quantities)
         turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
-        if solution.accuracy is not None:
-            summary["accuracy"] = solution.accuracy.plain()
         kept = solution.steady() if chosen else solution
         summary, files = _write_results(
             model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept
@@ -267,20 +199,104 @@ def run(
     if json_:
         show_json(summary)
         return
-    table, left_out = render_summary(summary, model.manifest, every=all_)
+    _show(model, solution, summary, turned, every=all_)
+    size = size_words((folder / "solution.nc").stat().st_size)
+    show_files(folder, files, f" (solution.nc: {size})")
+
+
+def _said(length: Mapping[str, float | None]) -> bool:
+    """Whether length or transient of a run was asked for."""
+    return any(value is not None for value in length.values())
+
+
+def _look_behind(
+    model: Model,
+    solution: Solution,
+    length: Mapping[str, Any],
+    given: Mapping[str, Any],
+    of: Sequence[str] | None,
+    stages: Stages,
+    *,
+    settle: bool,
+) -> tuple[Growth | None, Settled | None]:
+    """What a moved start and more turns change in the numbers of a run; warns of both."""
+    from ballpass.runtime.app.transient_words import transient_words
+    from ballpass.runtime.ask.peaks import run_of
+    from ballpass.runtime.run.settle import look_further
+
+    taken, parameters = solution.statistics, given["parameters"]
+    growth, longer = None, None
+    if solution.states and model.has_stepper:
+        growth = model.growth(**length, **given, rtol=taken.rtol, of=of)
+    if settle:
+        longer = model.settle(
+            **given,
+            transient=length["transient"],
+            method=taken.method,
+            rtol=taken.rtol,
+            kinks=cast("Kinks | None", taken.kinks),
+            progress=stages.fraction,
+        )
+        if not longer.settled:
+            warn(longer.words)
+        if growth is not None and growth.spread and longer.settled:  # of the turns whose numbers are printed
+            steady = longer.reductions
+            growth = model.growth(
+                **given,
+                duration=steady.start + steady.duration - taken.begin,
+                transient=steady.start / model.period(parameters),
+                rtol=taken.rtol,
+            )
+    else:
+        numbers = model.numbers(parameters)
+        longer = look_further(model, numbers, solution)
+        if longer is not None:
+            own = run_of(model, numbers, solution)
+            own = replace(own, start=longer.reductions.start, transient_cycles=solution.transient_cycles)
+            for words in transient_words(model, own, longer, asked=_said(length)):
+                warn(words)
+    if growth is not None and growth.words:
+        warn(growth.words)
+    return growth, longer
+
+
+def _summary(
+    model: Model, solution: Solution, growth: Growth | None, quantities: Mapping[str, QuantityValue]
+) -> dict[str, Any]:
+    """What summary.json holds, but for numbers of more turns."""
+    from ballpass.runtime.app.summary import summarize
+
+    summary = summarize(model, solution, growth)
+    for words in summary["limits"]:
+        note(words)
+    if quantities:
+        summary["quantities"] = {name: asdict(one) for name, one in quantities.items()}
+        for name, (mean, deviation) in (growth.asked if growth is not None else {}).items():
+            summary["quantities"][name]["over_starts"] = {"value": {"mean": mean, "std": deviation}}
+    if solution.accuracy is not None:
+        summary["accuracy"] = solution.accuracy.plain()
+    return summary
+
+
+def _show(model: Model, solution: Solution, summary: dict[str, Any], turned: str, *, every: bool) -> None:
+    """Print the table of a summary, with what more turns change."""
+    from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
+    from ballpass.runtime.app.summary_words import stands_out
+    from ballpass.runtime.report.report import Report
+    from ballpass.runtime.report.text import show as show_report
+
+    table, left_out = render_summary(summary, model.manifest, every=every)
     values = {**solution.parameters, **solution.constants}
     show_report(Report(title=summary["title"], parts=(*stands_out(model.manifest, values, summary), table)))
     if left_out:
         show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
-    if asked_for and solution.accuracy is None:
+    if "quantities" in summary and solution.accuracy is None:
         show_parts(render_quantities(model.manifest, summary["quantities"]))
     if turned:
         show_parts(turned)
     if solution.accuracy is not None:
         show_parts(render_accuracy(model, solution.accuracy))
         show_parts(solution.accuracy.words)
-    size = size_words((folder / "solution.nc").stat().st_size)
-    show_files(folder, files, f" (solution.nc: {size})")
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:

@@ -40,6 +40,7 @@ from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
+    from ballpass.runtime.app.commands.sweep_results import Sweep
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.run.locating import Kinks
 
@@ -202,19 +203,27 @@ def sweep(
         show_parts(table)
         show(f"{count} members, {len(result.failures)} without results.")
         show_files(folder, files)
-    for failure in result.failures[:NAMED]:
-        warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
-    if len(result.failures) > NAMED:
-        warn(f"and {len(result.failures) - NAMED} more members without results; {TABLE} names all.")
-    if swept.uncertain:
-        warn(
-            f"{len(swept.uncertain)} of {count} members amplify small errors: a start moved by the tolerance changes "
-            f"numbers marked ~ in their first four digits. First: {swept.place(min(swept.uncertain))}. Take "
-            "statistics over more turns (--cycles), and compare no single extremes of them."
-        )
+    _warn_of_members(swept, count)
     if result.interrupted:
         say_interrupted()
         raise typer.Exit(130)
     if len(result.failures) == count:
         complain(f"none of the {count} members has results: {result.failures[0].message}")
         raise typer.Exit(1)
+
+
+def _warn_of_members(swept: Sweep, count: int) -> None:
+    """Warnings about members without results, and those whose numbers have no digits."""
+    from ballpass.runtime.app.commands.sweep_results import TABLE
+
+    failures = swept.result.failures
+    for failure in failures[:NAMED]:
+        warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
+    if len(failures) > NAMED:
+        warn(f"and {len(failures) - NAMED} more members without results; {TABLE} names all.")
+    if swept.uncertain:
+        warn(
+            f"{len(swept.uncertain)} of {count} members amplify small errors: a start moved by the tolerance changes "
+            f"numbers marked ~ in their first four digits. First: {swept.place(min(swept.uncertain))}. Take "
+            "statistics over more turns (--cycles), and compare no single extremes of them."
+        )
