@@ -97,9 +97,10 @@ def test_drive_work_of_a_run_that_ends_within_a_turn_is_that_of_whole_turns(
     report = model.sensitivity(["drive_work"], [speed], duration=end, transient=2, check=False)
     assert report.quantities[0].notes == ()
     assert abs(report["drive_work", speed].dimensionless) < 1e-9
-    with pytest.raises(RequestError, match="drive_work: the time that counts holds no whole turn"):
-        model.quantities(["drive_work"], cycles=1.5, transient=0.75)
-    assert "drive_work" not in summarize(model, model.simulate(cycles=1.5, transient=0.75))
+    for cycles, transient in ((1.5, 0.75), (1.5, 1.0), (0.4, 0.1)):  # on both sides of a turn's end, and within a turn
+        with pytest.raises(RequestError, match="drive_work: the time that counts holds no whole turn"):
+            model.quantities(["drive_work"], cycles=cycles, transient=transient)
+        assert "drive_work" not in summarize(model, model.simulate(cycles=cycles, transient=transient))
 
 
 @pytest.mark.long

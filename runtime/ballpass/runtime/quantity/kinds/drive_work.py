@@ -32,7 +32,7 @@ def whole_cycles(run: Run) -> tuple[float, float] | None:
     for end in (last, math.floor(last + _NEAR)):
         count = cycle * math.floor((end - first) / cycle + _NEAR)
         begin = end - count
-        if count and min(abs(begin - first), abs(begin - round(begin))) < _NEAR * max(last, 1.0):
+        if count > 0 and min(abs(begin - first), abs(begin - round(begin))) < _NEAR * max(last, 1.0):
             return begin * run.turn, end * run.turn
     return None
 
