@@ -178,16 +178,19 @@ def _remedy(first: bool) -> str:
 def better_known(derivative: float, own_uncertainty: float, check: Check) -> tuple[float, float, bool]:
     """The number to give: that which is known better, its uncertainty, and whether it is the second one.
 
-    Where the second number excludes the first, the uncertainty of the first is at least their distance.
+    Both uncertainties come from neighbouring approximations: what is given is `CAUTION` times as much.  Where the
+    second number excludes the first, the uncertainty of the first is at least their distance.
     NaN where nothing is known: the routes have no digit in common, and neither is known to one or they exclude each
     other.
     """
     value, uncertainty = check.value, check.uncertainty
+    own = CAUTION * own_uncertainty
     if value is None or uncertainty is None or check.sides is not None:
-        return derivative, own_uncertainty, False
+        return derivative, own, False
     cautious, apart = CAUTION * uncertainty, abs(derivative - value)
     second = cautious < own_uncertainty or not np.isfinite(derivative)
-    own = max(own_uncertainty, apart) if apart > own_uncertainty + uncertainty else own_uncertainty
+    if apart > own_uncertainty + uncertainty:
+        own = max(own, apart)
     best = (value, cautious, True) if second else (derivative, own, False)
     wild = not apart <= WILD * max(abs(derivative), abs(value))
     if check.verdict is Verdict.VERIFIED or not wild or not np.isfinite(derivative):
