@@ -106,6 +106,15 @@ def test_no_route_gives_void_results(route: str, make_model: Callable[..., Model
         ROUTES[route](make_model("varying_compliance"))
 
 
+def test_scenes_whose_outputs_have_no_deflections_give_none_either(make_model: Callable[..., Model]) -> None:
+    """It was "There is no output 'ball.deflection'"."""
+    model = make_model("rotor")
+    assert "ball.deflection" not in [info.name for info in model.manifest.outputs]
+    with pytest.raises(IntegrationError, match="a ball is flattened by") as caught:
+        model.simulate(1, parameters={"loads.weight.force.x": 1e6}, outputs=[], transient=0)
+    assert caught.value.ball == 1  # on the load line at first
+
+
 @pytest.mark.parametrize("name", ["value:inner.x@0.1s", "amplitude:inner.x@cage"])
 def test_quantities_that_no_step_reduces_are_void_too(name: str, make_model: Callable[..., Model]) -> None:
     found = make_model("varying_compliance").simulate_many({FORCE: [196.0, HEAVY]}, name, cycles=1, transient=0)

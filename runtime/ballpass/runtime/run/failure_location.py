@@ -69,12 +69,11 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     found = FailureLocation(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found
-    at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
-    for bearing, turned in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
+    at_balls = ball_angles(model, numbers, time, state)
+    for bearing, turned, deflections in zip(
+        manifest.bearings, at_balls, ball_deflections(model, numbers, time, state), strict=True
+    ):
         angles = turned % driver_angle.TURN
-        x, y = (_apart(bearing, axis, at, state) for axis in "xy")
-        apart = x * np.cos(angles) + y * np.sin(angles) - radial_gap(bearing, values)
-        deflections = contact_cosine(bearing, values) * apart  # Eq. (6)
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
             found = FailureLocation(
@@ -85,6 +84,18 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
                 deflection=float(deflections[ball]),
                 element=bearing.element,
             )
+    return found
+
+
+def ball_deflections(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> list[np.ndarray]:
+    """Deflections of the balls of each bearing, Eq. (6), without what shapes of balls and raceways add [m]."""
+    manifest, values = model.manifest, numbers.values
+    at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
+    found = []
+    for bearing, angles in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
+        x, y = (_apart(bearing, axis, at, state) for axis in "xy")
+        apart = x * np.cos(angles) + y * np.sin(angles) - radial_gap(bearing, values)
+        found.append(contact_cosine(bearing, values) * apart)
     return found
 
 

@@ -22,11 +22,11 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import DEFLECTION, reduction_rows
+from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
 from ballpass.runtime.run.casadi_run import integrate
-from ballpass.runtime.run.failure_location import locate_failure, ring_distances
+from ballpass.runtime.run.failure_location import ball_deflections, locate_failure, ring_distances
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.locating import LOCATED, kinks_with_derivatives
 from ballpass.runtime.run.loop import ReductionRow, RunFailed, RunUnderWay, Samples, Sink, start_run
@@ -137,13 +137,13 @@ def _refuse_void(run: Run, trajectory: Trajectory) -> None:
     near = [values[f"{bearing.path}.ball_diameter"] * FLATTENED / 2.0 for bearing in manifest.bearings]
     if not apart.size or np.all(np.max(apart, axis=1) < near):
         return
-    names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
-    found = evaluate_outputs(run.model, run.numbers, trajectory, names)
-    for bearing, name in zip(manifest.bearings, names, strict=True):
-        most = np.max(found[name][counted], axis=1)
+    times, states = trajectory.t[counted], trajectory.x[counted]
+    found = [ball_deflections(run.model, run.numbers, time, state) for time, state in zip(times, states, strict=True)]
+    for bearing, tables in zip(manifest.bearings, zip(*found, strict=True), strict=True):
+        most = np.max(tables, axis=1)
         worst = int(np.argmax(most))
         if words := void_words(bearing, values, float(most[worst])):
-            time, state = float(trajectory.t[counted][worst]), trajectory.x[counted][worst]
+            time, state = float(times[worst]), states[worst]
             raise RunFailed(End.VOID, time, 0.0, state, locate_failure(run.model, run.numbers, time, state), words)
 
 
