@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -27,7 +27,7 @@ from ballpass.runtime.quantity.track import ChannelValues, follow
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.locating import kinks_with_derivatives
-from ballpass.runtime.run.loop import segments_of, step_ends
+from ballpass.runtime.run.loop import segments_of, steps_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.start import RunEnd
@@ -138,9 +138,9 @@ def contact_sequence(shooting: Shooting, nodes: np.ndarray, value: float | None 
     margins = [_margin(table, shift) for table, shift in zip(tables, shifts, strict=True)]
     touching = _sequence(np.concatenate(t), tables, length)
     n = len(touching) - 1
-    every = list(touching[:n])
+    every, again = list(touching[:n]), cache(partial(_renumbered, shifts=shifts, names=names))
     while len(every) < n * max(len(some) for some in [*names, ()]):  # until all balls are where they were
-        every += [_renumbered(some, shifts, names) for some in every[-n:]]
+        every += map(again, every[-n:])
     first = _least_rotation(every)
     turned = [every[(first + k) % len(every)] for k in range(n + 1)]
     shown = [tuple(names[table][k] for table, k in some) for some in turned]
@@ -168,12 +168,14 @@ def _deflections(
         kinks=kinks,
     )
     run = resolve(model, numbers, request)
-    corners = np.unique([run.begin, *step_ends(run).tolist(), run.end])
+    kept = steps_of(run)
+    corners = np.unique([run.begin, *kept[:, 0].tolist(), run.end])
     between = corners[:-1, None] + np.diff(corners)[:, None] * np.arange(PARTS) / PARTS
     t = np.append(between.ravel(), run.end)
     segments = segments_of(run)
     held = np.clip(np.searchsorted(segments.times, t) - 1, 0, len(segments.inputs) - 1)
-    seen = channels.along(follow(run, segments, make_edges(run, segments, None), fixed_nodes(t, held, held)), numbers)
+    track = follow(run, segments, make_edges(run, segments, None), fixed_nodes(t, held, held), kept=kept)
+    seen = channels.along(track, numbers)
     return t, *(seen[name].value for name in channels.channels)
 
 

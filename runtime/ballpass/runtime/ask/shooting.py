@@ -101,6 +101,7 @@ class Shooting:
     rtol : of the runs; None: that of derivatives
     over : parameter that varies, "" for none
     parts : keeps what is computed
+    progress : called with the finished fraction of each run
     """
 
     model: LoadedModel
@@ -112,6 +113,7 @@ class Shooting:
     rtol: float | None
     over: str
     parts: KeptParts
+    progress: Callable[[float], None] | None = None
 
     def numbers(self, value: float | None = None) -> Numbers:
         """Numbers of the model with this value of the varied parameter."""
@@ -191,7 +193,9 @@ class Shooting:
         length = self.repeats * self.period.time(numbers.values) / self.segments
         states = tuple(info.name for info in self.model.manifest.states)
         begin = RunEnd(time=k * length, x=nodes[k].copy(), states=states, parameters=numbers.parameters)
-        return Request(duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol)
+        return Request(
+            duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol, progress=self.progress
+        )
 
     def solve(self, nodes: np.ndarray) -> PeriodicState:
         """Newton's iteration from these states, with shorter steps where a whole one lessens nothing.

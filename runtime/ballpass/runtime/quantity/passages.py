@@ -22,7 +22,7 @@ from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.loop import segments_of, step_ends
+from ballpass.runtime.run.loop import segments_of, steps_of
 from ballpass.runtime.run.request import Request, check_memory
 from ballpass.runtime.run.resolve import Run, resolve
 
@@ -167,13 +167,14 @@ def entering_times(run: Run) -> dict[str, Array]:
 
 def _passages_of(run: Run) -> Passages:
     """Passages of all edges that the motion decides, of a run that is made for them."""
-    cuts, run = step_ends(run), replace(run, progress=None)
+    kept, run = steps_of(run), replace(run, progress=None)
+    cuts = kept[:, 0]
     count = 16 * len(run.model.states)
     check_memory("Edges along a run of", len(GAUSS) * len(cuts), count, "Run fewer cycles.")
     segments = segments_of(run)
     edges = make_edges(run, segments, None)
     panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
-    return find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges)))
+    return find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges), kept=kept))
 
 
 def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:

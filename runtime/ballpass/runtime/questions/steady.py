@@ -64,7 +64,14 @@ Segments = Annotated[
         most=200,
     ),
 ]
-Before = Annotated[float, Option(words="Turns to simulate before Newton's iteration begins.", shown="N", least=0.0)]
+Before = Annotated[
+    float,
+    Option(
+        words="Turns to simulate before Newton's iteration begins, as whole periods: one at least, unless it is zero.",
+        shown="N",
+        least=0.0,
+    ),
+]
 Over = Annotated[
     str | None,
     Option(
@@ -319,8 +326,10 @@ def steady(
             rtol=BRANCH_RTOL if rtol is None and ends is not None else rtol,
             over=ends.name if ends else "",
             parts=parts,
+            progress=None if tell is None or ends else _of_any_number(tell),
         )
-        whole = math.floor(transient * turn / length + 1e-9) if math.isfinite(turn) else 0
+        # a plain period costs a tenth of one with derivatives, and leads most motions near to the state
+        whole = max(math.floor(transient * turn / length + 1e-9), 1) if transient and math.isfinite(turn) else 0
         begin = np.array([numbers.values[name] for name in manifest.initial])
         if whole:
             begin = _run(model, given, whole * length, 1).x[-1]
@@ -368,6 +377,18 @@ def _run(
         progress=False,
     )
     return found
+
+
+def _of_any_number(tell: Callable[[float], None]) -> Callable[[float], None]:
+    """Progress of runs that follow each other: how many is not known, and each takes half of what is left."""
+    finished, before = 0, 0.0
+
+    def of_run(done: float) -> None:
+        nonlocal finished, before
+        finished, before = finished + (done < before), done
+        tell(1.0 - 0.5 ** (finished + done))
+
+    return of_run
 
 
 def _nodes(shooting: Shooting, start: np.ndarray) -> np.ndarray:

@@ -335,11 +335,11 @@ def segments_of(run: Run) -> Segments:
     return segments
 
 
-def step_ends(run: Run) -> np.ndarray:
-    """Ends of the steps of a run, shape (steps,) [s]; SimulationError where it fails."""
+def steps_of(run: Run) -> np.ndarray:
+    """The accepted steps of a run, shape (steps, numbers), see `KeptSteps`; SimulationError where it fails."""
     kept = KeptSteps(numbers=stepper_for(run.model, run.kinks).kept)
     start_run(run, [kept]).go_on()
-    return np.concatenate([np.empty(0), *(part[:, 0] for part in kept.parts)])
+    return kept.all
 
 
 def start_run(run: Run, sinks: Sequence[Sink], segments: Segments | None = None) -> RunUnderWay:
