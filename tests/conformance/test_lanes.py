@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts import PARTS, Part, shipped
+from coupled_scenes import EFFECTS, LAGGING, RUN, bearing
+from parts import PARTS, shipped
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
@@ -17,12 +18,17 @@ from ballpass.runtime import Model, load
 from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native import driver_library
 from ballpass.runtime.native.compilers import find_compiler
-from ballpass.runtime.native.reduction_rows import BALL_CHANNELS, JUMPS
+from ballpass.runtime.native.reduction_rows import BALL_CHANNELS
 from ballpass.runtime.ratings.readings import KINDS as LIVES
 
 #: What is reduced of a channel.
 KINDS = ("max", "min", "peak_time", "min_time", "mean", "rms")
 WITH_BALLS = ("damping law", "rolling element", "effect")
+BOTH_WAYS = bearing("A", effects=LAGGING), bearing("B", "rod", effects=EFFECTS)
+TEXTS = {
+    **{str(part): part.text for part in PARTS if part.registry in WITH_BALLS},
+    "effects in two-way bearings": "".join([shipped("punching_press").partition("[bearing]")[0], *BOTH_WAYS, RUN]),
+}
 METHODS_OF_RUNS = tuple(f"stepper-{name}" for name in METHODS)
 
 FORTY_ROLLERS = shipped(
@@ -98,9 +104,9 @@ def test_members_of_the_press_are_single_runs_to_the_bit(make_model: Callable[..
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("part", [p for p in PARTS if p.registry in WITH_BALLS], ids=str)
-def test_members_with_any_part_are_single_runs_to_the_bit(part: Part, model_of: Callable[[str], Model]) -> None:
-    model = model_of(part.text)
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_members_with_any_part_are_single_runs_to_the_bit(text: str, model_of: Callable[[str], Model]) -> None:
+    model = model_of(text)
     assert {m: differing(model, m, 0.3) for m in ("stepper-dp54", "stepper-rodas5p")} == {
         "stepper-dp54": [],
         "stepper-rodas5p": [],
@@ -128,21 +134,8 @@ def test_forty_rollers_in_lanes_are_those_of_single_runs(model_of: Callable[[str
 @pytest.mark.long
 @pytest.mark.extreme
 def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of: Callable[[str], Model]) -> None:
-    """And each is what it is alone."""
-    balls = [5 + k % 6 for k in range(20)]
-    model = model_of(bearings_on_a_shaft(balls))
-    assert differing(model, "stepper-dp54", 0.05) == []
-    run = {"transient": 0, "rtol": 1e-9, "method": "stepper-dp54", "kinks": "stepped-over"}
-    together = model.reduce(0.05, **run)  # type: ignore[arg-type]
-    for count in (5, 10):
-        alone = model_of(bearings_on_a_shaft([count])).reduce(0.05, **run)  # type: ignore[arg-type]
-        for k in (k for k in range(20) if balls[k] == count):
-            # means of what jumps within a step depend on where steps end
-            for channel in (*(name for name, jumps in JUMPS.items() if not jumps), "inner.x"):
-                one, other = together[f"b{k}.{channel}"], alone[f"b0.{channel}"]
-                expected = (one.maximum, one.minimum, one.mean, one.rms)
-                found = (other.maximum, other.minimum, other.mean, other.rms)
-                assert found == pytest.approx(expected, rel=0.0, abs=1e-6 * one.range), (k, channel)
+    """That each is what it is alone says test_cylindrical_roller.py."""
+    assert differing(model_of(bearings_on_a_shaft([5 + k % 6 for k in range(20)])), "stepper-dp54", 0.05) == []
 
 
 @pytest.mark.long

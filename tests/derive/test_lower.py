@@ -40,17 +40,6 @@ def test_one_sine_and_cosine_pair_serves_all_balls(scene_text: Callable[..., str
     assert kinds.count(ca.OP_COS) == 1
 
 
-def test_outputs_nobody_asked_for_are_not_generated(scene_text: Callable[..., str]) -> None:
-    text = scene_text("punching_press")
-    start = text.index("outputs = [")
-    few = text[:start] + 'outputs = ["inner.x"]\n'
-    functions = lower(derive(scene_from_text(few, "punching_press")))
-    assert operations(functions["outputs"]) == 0
-    everything = lower(derive(scene_from_text(text, "punching_press")))
-    assert operations(everything["outputs"]) > 100
-    assert operations(everything["rhs"]) == operations(functions["rhs"])
-
-
 def test_fixed_outer_ring_and_missing_damping_cost_nothing(scene_text: Callable[..., str]) -> None:
     """No coordinate, no parameter, no operation for what the scene does not name."""
     base = scene_text("varying_compliance")

@@ -297,23 +297,6 @@ def test_derivatives_and_members_are_right_where_the_motion_meets_the_spalls(tmp
     assert many["max:at_B.inner.y"][1] == pytest.approx(alone, rel=1e-9, abs=0.0)
 
 
-@pytest.mark.long
-def test_lanes_take_effects_in_every_coupling(tmp_path: Path) -> None:
-    """Two-way at constant speed, kinks stepped over: members beside each other in lanes are those alone."""
-    model = built(press(bearing("A", effects=LAGGING), bearing("B", "rod", effects=EFFECTS)), tmp_path / "model")
-    varied = {
-        "bearings.at_B.outer_waviness.7.amplitude": np.linspace(1e-6, 3e-6, 9),
-        "bearings.at_A.cage.slip.value.1": np.linspace(0.0, 0.4, 9),
-    }
-    many = model.simulate_many(varied, ["max:at_B.ball.force"], cycles=0.5, transient=0, rtol=1e-5)
-    assert many.statistics.lanes > 1
-    ends = [{name: values[k] for name, values in varied.items()} for k in (0, -1)]
-    fine = [model.reduce(cycles=0.5, transient=0, rtol=1e-9, parameters=end) for end in ends]
-    expected = [one["at_B.ball.force"].maximum for one in fine]
-    assert many["max:at_B.ball.force"][[0, -1]] == pytest.approx(expected, rel=2e-3)
-    assert abs(expected[1] / expected[0] - 1) > 1e-2
-
-
 SHAFT = ("[shaft]\n", '[shaft]\nring = "outer"\n')
 #: Every ball pressed, rings held in the middle.
 HELD = (

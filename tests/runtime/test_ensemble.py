@@ -59,38 +59,6 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 
 
 @pytest.mark.parametrize(
-    "law", ["one-sided", pytest.param("stiff", marks=pytest.mark.long), pytest.param("tangent", marks=pytest.mark.long)]
-)
-def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str) -> None:
-    """Of ``auto``, stepped over; by one method, lanes are the bits of single runs (conformance/test_lanes.py)."""
-    model, columns = press(make_model, law), table(11)
-    rtol = 1e-10 if law == "tangent" else 1e-8
-    result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=rtol, kinks="stepped-over")
-    assert result.failures == ()
-    assert result.statistics.lanes == model.ensemble_driver.lanes
-    for k in range(11):
-        single = model.reduce(1.5, transient=0.75, rtol=rtol, parameters=member(columns, k))
-        force, y = single["ball.force"], single["inner.y"]
-        # damping that jumps or turns steeply at contact costs order, and light damping lets one impact decide the next:
-        # at 1e-8 single runs of member 3 by one method, its clearance changed in the last bit, differ by a
-        # two-hundredth of the range
-        loose = {"one-sided": 5.0, "stiff": 20.0, "tangent": 500.0}[law]
-        expected = {
-            "max:ball.force": (force.maximum, 2e-6 * force.maximum),
-            "peak_time:ball.force": (force.maximum_time, 1e-7),
-            "min:inner.y": (y.minimum, 2e-6 * y.range),
-            "mean:ball.deflection": (single["ball.deflection"].mean, 2e-6 * single["ball.deflection"].range),
-            "rms_inner_y": (y.rms, 2e-6 * y.rms),
-            "range_inner_y": (y.range, 2e-6 * y.range),
-            "end:inner.vx": (single.end["inner.vx"], 2e-6 * single["inner.vy"].range),
-            "max:ball.damping_force": (single["ball.damping_force"].maximum, 2e-5 * force.maximum),
-        }
-        for name, (value, near) in expected.items():
-            assert result[name][k] == pytest.approx(value, rel=0.0, abs=loose * near), (name, k)
-        assert force.maximum_ball == result["peak_ball:ball.force"][k]
-
-
-@pytest.mark.parametrize(
     ("law", "rtol"),
     [
         pytest.param("stiff", 1e-3, marks=pytest.mark.long),
@@ -106,31 +74,6 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
     assert result.statistics.switches > 0
     assert result.statistics.steps == pytest.approx(sum(single.steps for single in singles), rel=0.01)
     assert result.statistics.rejected == pytest.approx(sum(single.rejected for single in singles), rel=0.05)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", [pytest.param("auto", marks=pytest.mark.extreme), "stepper-dp54"])
-def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMaker, method: str) -> None:
-    """The same bits, one member at a time; without being told, members locate kinks where single runs do."""
-    model, columns = press(make_model, "one-sided-gated"), table(3)
-    given = {"cycles": 1, "transient": 0, "rtol": 1e-7, "method": method}
-    located, over, plain = (
-        model.simulate_many(columns, OBSERVABLES, kinks=kinks, **given)  # type: ignore[arg-type]
-        for kinks in ("located", "stepped-over", None)
-    )
-    assert (located.statistics.kinks, located.statistics.lanes) == ("located", 1)
-    assert (over.statistics.kinks, over.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
-    assert not same(over, located)
-    # a method named by hand steps over, as in a single run
-    chosen = located if method == "auto" else over
-    assert (plain.statistics.kinks, plain.statistics.lanes) == (chosen.statistics.kinks, chosen.statistics.lanes)
-    assert same(plain, chosen)
-    for k in range(3):
-        single = model.reduce(**given, kinks="located", parameters=member(columns, k))  # type: ignore[arg-type]
-        assert located["max:ball.force"][k] == single["ball.force"].maximum
-        assert located["peak_time:ball.force"][k] == single["ball.force"].maximum_time
-        assert located["rms_inner_y"][k] == single["inner.y"].rms
-        assert located["end:inner.vx"][k] == single.end["inner.vx"]
 
 
 @pytest.mark.long

@@ -72,19 +72,6 @@ def test_a_housing_that_does_not_move_is_no_reason_for_millions_of_steps(make_mo
     assert 0 < steps["stepper"] < 2 * steps["stepper-rodas5p"]
 
 
-def test_members_of_an_ensemble_decide_alike(paper: Model) -> None:
-    stiffness = paper.parameters[STIFFNESS] * np.geomspace(30.0, 3000.0, 16)
-    found = paper.simulate_many({STIFFNESS: stiffness}, ["rms:inner.vy"], cycles=1, transient=0, rtol=1e-4)
-    assert not found.failures
-    implicit = paper.simulate_many(
-        {STIFFNESS: stiffness}, ["rms:inner.vy"], cycles=1, transient=0, rtol=1e-4, method="stepper-rodas5p"
-    )
-    explicit = paper.simulate_many(
-        {STIFFNESS: stiffness}, ["rms:inner.vy"], cycles=1, transient=0, rtol=1e-4, method="stepper-dp54"
-    )
-    assert found.statistics.steps < 2 * implicit.statistics.steps < explicit.statistics.steps
-
-
 def test_a_rate_that_vanishes_and_one_that_is_no_number_end(paper: Model) -> None:
     """No ball touches in a clearance this wide, and nothing holds the outer ring; then a stiffness that overflows."""
     free = paper.simulate(

@@ -15,34 +15,10 @@ from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 
-ENSEMBLE = [
-    "peak_ball_force",
-    "rms_inner_y",
-    "mean:ball.force",
-    "range:inner.x",
-    "min:ball.deflection",
-    "rms:ball.force",
-]
-
 
 def values(model: Model, of: list[str], **options: object) -> dict[str, float]:
     report = model.sensitivity(of, [next(iter(model.parameters))], check=False, **options)  # type: ignore[arg-type]
     return {item.name: item.value for item in report.quantities}
-
-
-def test_names_mean_the_numbers_of_ensembles(make_model: Callable[..., Model]) -> None:
-    """Nodes and panels here, reductions inside the stepper's steps there.
-
-    Stepped over, as derivatives are: the smallest deflection of the most loaded ball lies where two balls change rank,
-    and is met to a part of a quarter step, which is longer where steps end on kinks.
-    """
-    model = make_model("punching_press")
-    found = values(model, ENSEMBLE, cycles=2, transient=1)
-    many = model.simulate_many(
-        {"bearing.clearance": [10e-6]}, ENSEMBLE, cycles=2, transient=1, rtol=1e-10, kinks="stepped-over"
-    )
-    for name in ENSEMBLE:
-        assert found[name] == pytest.approx(float(many[name][0]), rel=2e-5), name
 
 
 def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_model: Callable[..., Model]) -> None:
