@@ -510,14 +510,6 @@ def test_kinks_are_located_by_default_where_the_tolerance_is_tight(gated: Model,
             assert np.array_equal(run.x, named.x)
 
 
-def test_reductions_locate_as_runs_do(gated: Model) -> None:
-    given = {"duration": 0.01, "parameters": {"bearing.clearance": CLEARANCE}, "kinks": "located"}
-    solution = gated.simulate(**given)  # type: ignore[arg-type]
-    reduced = gated.reduce(**given)  # type: ignore[arg-type]
-    assert reduced.steps == solution.statistics.steps
-    assert [reduced.end[name] for name in gated.states] == pytest.approx(solution.x[-1].tolist(), rel=1e-12, abs=0.0)
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

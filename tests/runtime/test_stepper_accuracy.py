@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -184,15 +184,6 @@ def test_without_kinks_errors_fall_with_the_tolerance(make_model: Make, method: 
     errors = errors_around(model, exact.x, np.array(exact.statistics.magnitudes), method)
     middle = typical(errors)
     assert all(tight < max(loose / 12, 2e-7) for loose, tight in pairwise(middle)), middle
-
-
-@pytest.mark.long
-def test_families_agree_among_each_other(make_model: Make) -> None:
-    """On the crank-shaper, which magnifies errors more than the scenes above."""
-    model = make_model("crank_shaper")
-    runs = [model.simulate(0.5, method=method, rtol=1e-11, samples_per_cycle=50, outputs=()) for method in STEPPERS]
-    for one, other in combinations(runs, 2):
-        assert np.max(np.abs(one.x - other.x) / one.statistics.magnitudes) < 3e-6
 
 
 def test_stiff_damping_is_followed_by_both_families(make_model: Make) -> None:

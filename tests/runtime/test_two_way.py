@@ -68,17 +68,6 @@ def test_the_bearing_carries_the_linkage(press: Model) -> None:
     assert np.allclose(mass, mass.T, rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.long
-def test_members_in_lanes_are_single_runs(hinges: Model) -> None:
-    clearances = np.linspace(5e-6, 15e-6, 9)
-    names = ["peak_pin_ball_force", "rms:main.inner.y"]
-    many = hinges.simulate_many({"bearings.pin.clearance": clearances}, names, rtol=1e-9, kinks="stepped-over", **SHORT)
-    for k in (0, 8):
-        one = hinges.reduce(parameters={"bearings.pin.clearance": clearances[k]}, rtol=1e-9, **SHORT)
-        assert many[names[0]][k] == pytest.approx(one["pin.ball.force"].maximum, rel=1e-5)
-        assert many[names[1]][k] == pytest.approx(one["main.inner.y"].rms, rel=1e-5, abs=0.0)
-
-
 TEN = (
     *("bearing.clearance", "mechanism.bodies.rod.inertia", "bearing.damping.ratio", "mechanism.driver.speed"),
     *("mechanism.bodies.crank.mass", "mechanism.bodies.rod.mass", "mechanism.bodies.slider.mass"),
