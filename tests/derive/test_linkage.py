@@ -27,7 +27,7 @@ from quick_cases import long_but
 
 from ballpass.derive.mechanism.kinematics import dot
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
-from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import Joint, Mechanism
 

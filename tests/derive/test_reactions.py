@@ -22,8 +22,8 @@ from linkages import (
 )
 
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.errors import LinkageError
 
 STATES = 200

@@ -13,8 +13,8 @@ from ballpass.derive.drive.constant_speed import ConstantSpeed
 from ballpass.derive.mechanism.forces import BodyTorque, ConstantForce, Forces, PointForce, Windows, derive_forces
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
-from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
+from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
 from ballpass.derive.variables import phase

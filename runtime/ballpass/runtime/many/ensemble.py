@@ -12,25 +12,27 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import threading
 import time as clocks
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.contract.units import printed_unit
-from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
-from ballpass.runtime.many.member_values import measure_members
+from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 from ballpass.runtime.quantity.layout import is_reduced, needed_rows
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
@@ -38,6 +40,7 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.run.loop import RunFailed
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.run.resolve import check_span, check_transient
@@ -357,3 +360,56 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
             members.refused[member] = str(fault)
             durations[member] = starts[member] = 0.0
     return Span(durations=durations, turns=turns, starts=starts)
+
+
+def measure_members(
+    work: Work,
+    quantities: Sequence[Quantity],
+    able: np.ndarray,
+    found: np.ndarray,
+    threads: int,
+    progress: Callable[[float], None],
+) -> bool:
+    """Evaluate quantities that steps do not reduce, member by member; whether the user interrupted.
+
+    Parameters
+    ----------
+    found : filled, NaN for a quantity that is not known, shape (members, quantities)
+    """
+    own = threading.local()  # a `QuantityRun` is not for several threads
+
+    def measure(member: int, which: tuple[int, ...]) -> tuple[dict[int, float], RequestError | SimulationError | None]:
+        """Values by their place, and why some are not known."""
+        runs = own.__dict__.setdefault("runs", {})
+        if which not in runs:
+            runs[which] = QuantityRun(work.model, [quantities[k] for k in which])
+        try:
+            values = runs[which].measure(member_run(work, member)).values.tolist()
+            return dict(zip(which, values, strict=True)), None
+        except (RequestError, SimulationError) as fault:
+            known: dict[int, float] = {}
+            if len(which) > 1:  # one by one
+                for k in which:
+                    known |= measure(member, (k,))[0]
+            return known, fault
+
+    every = tuple(range(len(quantities)))
+    with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="ballpass") as pool:
+        pending = [pool.submit(measure, member, every) for member in able.tolist()]
+        done = 0
+        try:
+            for member, future in zip(able.tolist(), pending, strict=True):
+                values, fault = future.result()
+                done += 1
+                found[member, list(values)] = list(values.values())
+                if fault is not None and member not in work.results:
+                    ended = (fault.status.name, fault.time) if isinstance(fault, RunFailed) else ("REFUSED", 0.0)
+                    note_failure(work, member, ended[0], str(fault), ended[1])
+                progress(done / len(pending))
+        except KeyboardInterrupt:
+            for future in pending:
+                future.cancel()
+            for member in able[done:].tolist():
+                note_failure(work, member, "INTERRUPTED", "Interrupted before it was done.")
+            return True
+    return False
