@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -135,6 +135,27 @@ def test_starts_along_a_curved_limit_are_apart_and_take_the_corners(make_model: 
 
 
 @pytest.mark.long
+def test_the_longest_life_over_clearance_is_that_of_a_fine_sweep(make_model: Callable[..., Model]) -> None:
+    """At some preload more balls carry; the worst of a tolerance is then the shortest life within it."""
+    press, clearance = make_model("punching_press"), "bearing.clearance"
+    length: dict[str, Any] = {"cycles": 4, "transient": 2}
+    grid = np.linspace(-20e-6, 40e-6, 151)
+    swept = press.simulate_many({clearance: grid}, "life", **length)["life"]
+    found = press.optimize("-life", f"{clearance}=-20 um:40 um", starts=1, **length)
+    assert found.bounds == ("",)
+    assert found.value == pytest.approx(swept.max(), rel=1e-4)
+    assert found.x[0] == pytest.approx(grid[np.argmax(swept)], abs=0.6e-6)
+    assert max(found.trace) == pytest.approx(found.value, rel=1e-9)
+    assert str(found).startswith("Largest life: ")
+    boxed = press.optimize(
+        "-life", f"{clearance}=-20 um:40 um", tolerance=f"{clearance}=-2 um:2 um", starts=1, **length
+    )
+    worst = np.minimum(swept[:-10], swept[10:])  # 4 um apart: life has one maximum
+    assert boxed.value == pytest.approx(worst.max(), rel=2e-3)
+    assert boxed.value < boxed.nominal <= found.value * (1.0 + 1e-6)
+
+
+@pytest.mark.long
 def test_a_wrong_gradient_is_caught(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
     press = make_model("punching_press")
     slopes = QuantityFunction.jacobian
@@ -179,7 +200,10 @@ def test_a_limit_of_zero_holds_the_optimum_or_is_said_not_to_be_kept(make_model:
         rotor.quantities("mean:inner.y", cycles=12, transient=10)["mean:inner.y"].value
     )
     assert not found.report().fault
+    assert found.kept == (True,)
     other = rotor.optimize("mean:inner.x", f"{sideways}=-30 N:-10 N", **asked)
+    assert other.kept == (False,)
+    assert "(a limit not kept)" in str(other)
     assert "found no values within the bounds that keep the limit of mean:inner.x" in other.report().fault
     assert "limit 0: not kept" in str(other)
 

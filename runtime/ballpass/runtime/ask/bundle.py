@@ -84,7 +84,8 @@ def minimize_by_planes(evaluate: Callable[[np.ndarray], Plane], start: np.ndarra
         if best.merit - promised < 1e-12 * max(abs(best.merit), 1.0):
             half /= 4.0
             continue
-        then = evaluate(np.clip(best.x + step, 0.0, 1.0))
+        # a step onto a bound is exact but for the rounding of the linear program
+        then = evaluate(np.clip(np.round(best.x + step, 12), 0.0, 1.0))
         seen.append(then)
         if best.merit - then.merit >= ENOUGH * (best.merit - promised):
             best, half = then, min(2.0 * half, BOX)

@@ -37,14 +37,14 @@ class WorstValues:
 
     Parameters
     ----------
-    goal : quantity to make least
+    goal : quantity to make least, or largest
     limits : of other quantities
     vary, box : ranges of what is varied, and of the deviations
 
     Attributes
     ----------
     decides : what decides the values beside the model, for parts that are kept
-    sizes : of goal and limits, SI; known after `candidates`
+    sizes : of goal and limits, SI, known after `candidates`; below zero of a goal to make largest
     """
 
     def __init__(
@@ -55,6 +55,7 @@ class WorstValues:
         vary: Sequence[ParameterRange],
         box: Sequence[ParameterRange],
         *,
+        largest: bool,
         cycles: float | None,
         transient: float | None,
         parameters: Mapping[str, float] | None,
@@ -77,7 +78,8 @@ class WorstValues:
         self._signs = np.array([1.0, *(one.sign for one in limits)])
         self._offsets = np.array([0.0, *(one.limit for one in limits)])
         self._deviations = self._all_deviations()
-        self.decides = (names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self._deviations)
+        self._ways = np.array([-1.0 if largest else 1.0, *(1.0 for _ in limits)])
+        self.decides = (largest, names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self._deviations)
         self.sizes = np.ones(len(self._columns))
 
     def candidates(self, shares: np.ndarray, parts: KeptParts) -> np.ndarray:
@@ -96,7 +98,7 @@ class WorstValues:
         seen = np.median(np.abs(found[known][..., self._columns]), axis=(0, 1))
         # a limit of zero has no size of its own
         limits = (abs(one.limit) or size for one, size in zip(self._limits, seen[1:].tolist(), strict=True))
-        self.sizes = np.maximum([seen[0], *limits], 1e-300)
+        self.sizes = self._ways * np.maximum([seen[0], *limits], 1e-300)
         worst = (scaled / self.sizes).max(axis=1)
         merits = [Plane(x=s, values=v, slopes=v).merit for s, v in zip(shares, worst, strict=True)]
         return np.where(known, merits, np.inf)
@@ -131,7 +133,8 @@ class WorstValues:
     def worst_of_further(self, share: np.ndarray) -> float:
         """The worst goal at points of the box that the search does not see [its unit]."""
         spread = Halton(len(self._box), scramble=False).random(FURTHER + WITHIN + 1)[WITHIN + 1 :]
-        return float(np.max(self._lanes(self._rows(share)[0] + self._placed(spread))[:, 0]))
+        found = self._lanes(self._rows(share)[0] + self._placed(spread))[:, 0]
+        return float(self._ways[0] * np.max(self._ways[0] * found))
 
     def verdicts(self, least: BundleMinimum) -> dict[str, str]:
         """Check of the goal's slopes by a second route, by parameter; beside a kink on each of its sides."""
@@ -163,7 +166,9 @@ class WorstValues:
         """The deviation with the worst value of goal and each limit."""
         if len(self._deviations) == 1:
             return np.zeros(len(self._columns), dtype=int)
-        found: np.ndarray = np.argmax(self._signs * self._lanes(self._rows(share))[:, self._columns], axis=0)
+        found: np.ndarray = np.argmax(
+            self._ways * self._signs * self._lanes(self._rows(share))[:, self._columns], axis=0
+        )
         return found
 
     def _exactly(self, share: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -44,7 +44,12 @@ WORSE = 1e-3
 ACTIVE = 1e-5
 
 Goal = Annotated[
-    str, Option(words="Quantity to make least, as `peak_ball_force`.", shown="Q", names=option_names.quantities)
+    str,
+    Option(
+        words="Quantity to make least, as `peak_ball_force`; with a minus in front to make it largest: `-life`.",
+        shown="Q",
+        names=option_names.goals,
+    ),
 ]
 Vary = Annotated[
     str | Sequence[str],
@@ -94,12 +99,13 @@ Starts = Annotated[
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Optimum(ShortRepr, Reported):
-    """The least value that was found.
+    """The least value that was found, or the largest.
 
     Attributes
     ----------
     goal, unit : quantity and its unit
-    value : least value [unit]
+    largest : whether the largest value was asked for
+    value : least value, or the largest [unit]
     vary : parameters and their bounds
     x : their values there, SI, shape (parameters,)
     bounds : "first", "second" or "" for each parameter: the end of its range that holds the optimum
@@ -107,6 +113,7 @@ class Optimum(ShortRepr, Reported):
     limits : constraints
     verdicts : of the check of the slopes: parameter, verdict
     starts : where each search began and the value where it ended, SI: pairs of tuple and number
+    kept : whether each of them ended where all limits are kept
     trace : values of the goal of the best search, in order [unit]
     converged : whether the search ended by itself
     tolerances : deviations within which all values are the worst; none for values without deviations
@@ -124,6 +131,7 @@ class Optimum(ShortRepr, Reported):
 
     goal: str
     unit: str
+    largest: bool
     value: float
     vary: tuple[ParameterRange, ...]
     x: np.ndarray
@@ -132,6 +140,7 @@ class Optimum(ShortRepr, Reported):
     limits: tuple[Limit, ...]
     verdicts: tuple[tuple[str, str], ...]
     starts: tuple[tuple[tuple[float, ...], float], ...]
+    kept: tuple[bool, ...]
     trace: tuple[float, ...]
     converged: bool
     tolerances: tuple[ParameterRange, ...]
@@ -151,6 +160,10 @@ class Optimum(ShortRepr, Reported):
         """
         return len(self.slopes) > 1
 
+    @property
+    def _most(self) -> str:
+        return "largest" if self.largest else "least"
+
     def _report(self) -> Report:
         rows = [
             {
@@ -164,7 +177,8 @@ class Optimum(ShortRepr, Reported):
         ]
         factor, unit = table_unit(self.unit)
         table = ReportTable(
-            title=f"Least {'worst ' if self.tolerances else ''}{self.goal}: {factor * self.value:.9g} {unit}",
+            title=f"{self._most.capitalize()} {'worst ' if self.tolerances else ''}{self.goal}: "
+            f"{factor * self.value:.9g} {unit}",
             heads=("parameter", "value", "unit", "held by", f"slope [{unit} per that unit]"),
             rows=[
                 (
@@ -180,7 +194,10 @@ class Optimum(ShortRepr, Reported):
         )
         said = []
         if any(self.bounds):
-            said.append("held by: the end of the given range at which the least value lies; beyond it, it is smaller")
+            said.append(
+                f"held by: the end of the given range at which the {self._most} value lies; beyond it, it is "
+                f"{'larger' if self.largest else 'smaller'}"
+            )
         for limit in self.limits:
             its, its_unit = table_unit(limit.unit)
             otherwise = "not kept" if limit.beyond > ACTIVE else "not active"
@@ -198,39 +215,49 @@ class Optimum(ShortRepr, Reported):
             )
             said.append(
                 f"Worst at {deviations}. Without deviations {self.goal} is {factor * self.nominal:.7g} {unit}; at "
-                f"{FURTHER} more points of the tolerances it is at most {factor * self.further:.7g} {unit}."
+                f"{FURTHER} more points of the tolerances it is at {'least' if self.largest else 'most'} "
+                f"{factor * self.further:.7g} {unit}."
             )
         if self.kinked:
             said.append(
-                f"A kink: {len(self.slopes)} smooth parts meet here, and the goal grows on each side. Slopes are those "
-                "of the parts."
+                f"A kink: {len(self.slopes)} smooth parts meet here, and the goal "
+                f"{'falls' if self.largest else 'grows'} on each side. Slopes are those of the parts."
             )
         checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts)
         said.append(f"slopes {'beside the kink ' if self.kinked else ''}by a second route: {checked}")
-        ends = ", ".join(f"{factor * end:.7g}" for _, end in self.starts)
+        ends = ", ".join(
+            f"{factor * end:.7g}{'' if kept else ' (a limit not kept)'}"
+            for (_, end), kept in zip(self.starts, self.kept, strict=True)
+        )
         said.append(f"{len(self.starts)} start{'s' if len(self.starts) > 1 else ''} ended at {ends} {unit}")
         wrong = [name for name, verdict in self.verdicts if verdict == "disagrees"]
         broken = [one.quantity for one in self.limits if one.beyond > ACTIVE]
         fault = ""
         if wrong:
-            fault = f"Slopes by {', '.join(wrong)} disagree with the second route: this need not be the least value."
+            fault = (
+                f"Slopes by {', '.join(wrong)} disagree with the second route: this need not be the {self._most} value."
+            )
         elif broken:
             fault = f"The search found no values within the bounds that keep the limit of {', '.join(broken)}."
         elif not self.converged:
             fault = "The search did not end by itself. Give more starts, narrower bounds, or another search: slsqp."
         warned = []
-        if self.further > self.value + WORSE * abs(self.value):
+        worse = (self.value - self.further) if self.largest else (self.further - self.value)
+        if worse > WORSE * abs(self.value):
             warned.append(
                 f"{self.goal} is {factor * self.further:.6g} {unit} at a point within the tolerances at which the "
-                "search did not evaluate it: the worst is larger than the value given. Give narrower tolerances."
+                "search did not evaluate it: worse than the value given. Give narrower tolerances."
             )
         facts = {
-            **self._named("goal", "unit", "value"),
+            **self._named("goal", "unit", "largest", "value"),
             "parameters": rows,
             "kinked": self.kinked,
             "limits": [asdict(one) for one in self.limits],
             "verdicts": [list(pair) for pair in self.verdicts],
-            "starts": [{"start": list(start), "end": end} for start, end in self.starts],
+            "starts": [
+                {"start": list(start), "end": end, "kept": kept}
+                for (start, end), kept in zip(self.starts, self.kept, strict=True)
+            ],
             **self._named("trace", "converged"),
             "tolerances": [
                 {"parameter": one.name, "low": one.low, "high": one.high, "worst": value}
@@ -246,7 +273,7 @@ class Optimum(ShortRepr, Reported):
 def _figures(_model: AnyModel, found: Optimum, _parameters: object) -> Iterator[tuple[str, Figure]]:
     from ballpass.runtime.plot.optimum import draw_trace
 
-    yield "trace", draw_trace(found.goal, found.unit, found.trace)
+    yield "trace", draw_trace(found.goal, found.unit, found.trace, largest=found.largest)
 
 
 def _best(found: Optimum) -> dict[str, float]:
@@ -269,7 +296,7 @@ def optimize(
     keep: str | Path | None = None,
     progress: Progress = None,
 ) -> Optimum:
-    """Find the least value of a quantity over parameters, also where it has a kink.
+    """Find the least or largest value of a quantity over parameters, also where it has a kink.
 
     Peaks are the largest of many, so that their least value lies on a kink as a rule. The search works on tangent
     planes of several points at once; slopes are exact, and checked by a second route at the optimum.
@@ -317,7 +344,14 @@ def optimize(
         )
     varied = [one.name for one in (*ranges, *box)]
     limits = read_limits(model.manifest, "subject_to", _texts(subject_to), model, parameters, varied)
-    worst = WorstValues(model, minimize, limits, ranges, box, cycles=cycles, transient=transient, parameters=parameters)
+    goal, largest = minimize.removeprefix("-"), minimize.startswith("-")
+    worst = WorstValues(
+        *(model, goal, limits, ranges, box),
+        largest=largest,
+        cycles=cycles,
+        transient=transient,
+        parameters=parameters,
+    )
     count = len(ranges)
     shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
     if count <= MOST_TOLERANCES:
@@ -344,8 +378,9 @@ def optimize(
             nominal, further = worst.without_deviations(best.x), worst.worst_of_further(best.x)
     slopes = [side.slopes[0] * sizes[0] / worst.by_share(best.x) for side in least.sides]
     return Optimum(
-        goal=minimize,
-        unit=quantities_of(model, [minimize])[0].unit,
+        goal=goal,
+        unit=quantities_of(model, [goal])[0].unit,
+        largest=largest,
         value=float(best.values[0] * sizes[0]),
         vary=ranges,
         x=worst.at(best.x),
@@ -363,6 +398,7 @@ def optimize(
         ),
         verdicts=tuple(verdicts.items()),
         starts=tuple((tuple(worst.at(s).tolist()), float(one.best.values[0] * sizes[0])) for s, one in found),
+        kept=tuple(bool(np.all(one.best.values[1:] <= ACTIVE)) for _, one in found),
         trace=tuple(float(one.values[0] * sizes[0]) for one in least.trace),
         converged=least.converged,
         tolerances=box,

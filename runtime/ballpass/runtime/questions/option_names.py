@@ -27,6 +27,11 @@ def quantities(manifest: Manifest | None, _option: str, texts: Sequence[str]) ->
         parse_quantities(manifest, texts)
 
 
+def goals(manifest: Manifest | None, option: str, texts: Sequence[str]) -> None:
+    """Quantities, with a minus in front of one that is to be largest: ``-life``."""
+    quantities(manifest, option, [text.removeprefix("-") for text in texts])
+
+
 def limits(manifest: Manifest | None, option: str, texts: Sequence[str]) -> None:
     """Limits of quantities: ``rms:inner.y <= 5 um``."""
     from ballpass.runtime.ask.limits import limited, read_limits
