@@ -137,6 +137,16 @@ def test_requests_that_contradict_each_other_are_refused(tmp_path: Path) -> None
 
 
 @pytest.mark.long
+def test_a_set_that_does_not_fit_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("set.toml").write_text(SPEC.replace("10 kHz", "1e12 Hz"), encoding="utf-8")
+    done = CliRunner().invoke(app, ["dataset", "set.toml"])
+    assert done.exit_code == 2
+    assert "would not fit into memory" in done.stderr
+    assert not Path("results").exists()
+
+
+@pytest.mark.long
 def test_a_command_that_was_killed_is_taken_up_again(tmp_path: Path) -> None:
     """With a cluster and without one, and the numbers are those that nobody killed."""
     (tmp_path / "set.toml").write_text(SPEC.replace("members = 40", "members = 200\nchunk = 4"))

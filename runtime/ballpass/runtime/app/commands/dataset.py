@@ -58,7 +58,6 @@ def dataset(
         read = read_spec(spec)
         path = out if out is not None else Path("results") / f"{spec.stem}.zarr"
         check_folder(path.parent)
-        path.parent.mkdir(parents=True, exist_ok=True)
         with connected(scheduler, workers) as client:
             classes = [_signal_class(one, read.signals, stages) for one in read.classes]
             stages("simulate")
