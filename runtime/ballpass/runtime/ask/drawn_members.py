@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.many.distributions import Distribution, plain_arguments
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.show.progress import Progress, shown
 
 #: Most members; those that are run together where they are kept: a tenth slower than all at once.
 MOST, BLOCK = 10_000_000, 1024
@@ -86,11 +88,6 @@ def check_count(members: int) -> None:
         raise RequestError(f"samples: {members} members. Allowed: {MOST}. Give fewer samples.")
 
 
-def words_of(one: Distribution) -> str:
-    """A distribution with its arguments, SI."""
-    return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"
-
-
 def fault_of(failed: int, members: int, known: bool) -> str:
     """What is at fault where members without results leave no number that was asked for; empty if nothing is.
 
@@ -107,13 +104,8 @@ def fault_of(failed: int, members: int, known: bool) -> str:
     return ""
 
 
-def infinite_words(names: Sequence[str], values: np.ndarray) -> tuple[str, ...]:
-    """Warnings about infinite values, as lives of bearings that carry nothing: means and shares leave them out.
-
-    Parameters
-    ----------
-    values : of the quantities, shape (members, quantities)
-    """
+def _infinite_words(names: Sequence[str], values: np.ndarray) -> tuple[str, ...]:
+    """Warnings about infinite values, as lives of bearings that carry nothing: means and shares leave them out."""
     counts = np.count_nonzero(np.isinf(values), axis=0).tolist()
     return tuple(
         f"{name} is infinite in {count} of {len(values)} members, which its means and shares leave out."
@@ -125,6 +117,39 @@ def infinite_words(names: Sequence[str], values: np.ndarray) -> tuple[str, ...]:
 def values_of(inputs: Mapping[str, Distribution], shares: np.ndarray) -> np.ndarray:
     """Values of the inputs from shares of smaller ones, shape (members, inputs)."""
     return np.stack([one.values(share) for one, share in zip(inputs.values(), shares.T, strict=True)], axis=1)
+
+
+def run_drawn(
+    model: LoadedModel,
+    inputs: Mapping[str, Distribution],
+    members: np.ndarray,
+    names: Sequence[str],
+    seed: int,
+    progress: Progress,
+    **run: Any,
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Values of quantities, shape (members, quantities), and what an answer says of the members: its fields.
+
+    Parameters
+    ----------
+    members, names, run : as for `run_members`
+    """
+    with shown("simulating", progress) as tell:
+        values, faults = run_members(model, tuple(inputs), members, names, progress=tell, **run)
+    return values, {
+        "inputs": tuple(inputs),
+        "distributions": tuple(map(_words_of, inputs.values())),
+        "seed": seed,
+        "members": len(values),
+        "failed": len(faults),
+        "fault": faults[0] if faults else "",
+        "infinite": _infinite_words(names, values),
+    }
+
+
+def _words_of(one: Distribution) -> str:
+    """A distribution with its arguments, SI."""
+    return f"{one.name}({', '.join(f'{key}={value:g}' for key, value in one.arguments.items())})"
 
 
 def run_members(

@@ -13,11 +13,9 @@ from ballpass.runtime.contract.options import Cycles, Option, Transient
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
-from ballpass.runtime.questions.sobol import Seed, Spread
+from ballpass.runtime.questions.sobol import DrawnAnswer, Seed, Spread
 from ballpass.runtime.report.report import Report, ReportTable
-from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.show.progress import Progress, shown
-from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.show.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +53,7 @@ class ScreenedQuantity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class MorrisAnswer(ShortRepr, Reported):
+class MorrisAnswer(DrawnAnswer):
     """Effects of uncertain inputs on quantities.
 
     Attributes
@@ -76,14 +74,7 @@ class MorrisAnswer(ShortRepr, Reported):
     (24, True)
     """
 
-    inputs: tuple[str, ...]
-    distributions: tuple[str, ...]
     quantities: tuple[ScreenedQuantity, ...]
-    seed: int
-    members: int
-    failed: int
-    fault: str
-    infinite: tuple[str, ...]
 
     def _report(self) -> Report:
         from ballpass.runtime.ask.drawn_members import fault_of
@@ -114,18 +105,12 @@ class MorrisAnswer(ShortRepr, Reported):
                 )
             )
             records += [{"quantity": one.name, "input": name, **asdict(effect)} for name, effect in ranked]
-        warned = [*self.infinite]
-        if self.failed:
-            warned.append(
-                f"{self.failed} of {self.members} members have no result, and were left out with those that they are "
-                f"compared with. The first: {self.fault}"
-            )
         return Report(
             parts=parts,
             facts={**asdict(self), "first_fault": self.fault},
             records=records,
             index=("quantity", "input"),
-            warnings=warned,
+            warnings=self._warnings(),
             fault=fault_of(self.failed, self.members, known),
         )
 
@@ -175,14 +160,7 @@ def morris(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.drawn_members import (
-        check_count,
-        infinite_words,
-        read_inputs,
-        run_members,
-        values_of,
-        words_of,
-    )
+    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_drawn, values_of
     from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
     from ballpass.runtime.quantity.grammar import quantities_of
 
@@ -192,31 +170,17 @@ def morris(
     count = len(inputs)
     check_count(base * (count + 1))
     shares = Halton(count, scramble=True, seed=np.random.default_rng(seed)).random(base)
-    every = np.concatenate([shares, *moved(shares)])
-    with shown("simulating", progress) as tell:
-        values, faults = run_members(
-            model,
-            tuple(inputs),
-            values_of(inputs, every),
-            names,
-            cycles=cycles,
-            transient=transient,
-            parameters=parameters,
-            keep=keep,
-            progress=tell,
-        )
+    members = values_of(inputs, np.concatenate([shares, *moved(shares)]))
+    values, facts = run_drawn(
+        *(model, inputs, members, names, seed, progress),
+        cycles=cycles,
+        transient=transient,
+        parameters=parameters,
+        keep=keep,
+    )
     quantities = []
     for name, unit, column in zip(names, units, values.T, strict=True):
         first, *others = column.reshape(-1, base)
         effects = elementary_effects(shares, first, np.array(others), seed)
         quantities.append(ScreenedQuantity(name=name, unit=unit, effects=tuple(effects)))
-    return MorrisAnswer(
-        inputs=tuple(inputs),
-        distributions=tuple(words_of(one) for one in inputs.values()),
-        quantities=tuple(quantities),
-        seed=seed,
-        members=len(values),
-        failed=len(faults),
-        fault=faults[0] if faults else "",
-        infinite=infinite_words(names, values),
-    )
+    return MorrisAnswer(**facts, quantities=tuple(quantities))

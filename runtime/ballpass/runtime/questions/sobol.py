@@ -19,7 +19,7 @@ from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
 
 if TYPE_CHECKING:
@@ -115,7 +115,42 @@ class SpreadQuantity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class SobolAnswer(ShortRepr, Reported):
+class DrawnAnswer(ShortRepr, Reported):
+    """What was drawn, and how many members have results.
+
+    Attributes
+    ----------
+    inputs : parameters that vary
+    distributions : of the inputs, in words
+    seed, members : seed, members in all
+    failed : members without results, and `fault` of the first
+    infinite : quantities that are infinite in some members, in words
+    """
+
+    inputs: tuple[str, ...]
+    distributions: tuple[str, ...]
+    seed: int
+    members: int
+    failed: int
+    fault: str
+    infinite: tuple[str, ...]
+
+    def _warnings(self) -> list[str]:
+        from ballpass.runtime.ask.variance_shares import wilson
+
+        if not self.failed:
+            return [*self.infinite]
+        low, high = (rounded(100.0 * end, 2) for end in wilson(self.failed, self.members))
+        return [
+            *self.infinite,
+            f"{self.failed} of {self.members} members have no result ({low} to {high} %). They were left out with "
+            "those that they are compared with: all numbers are of inputs that can be simulated. The first: "
+            f"{self.fault}",
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class SobolAnswer(DrawnAnswer):
     """Quantities over uncertain inputs.
 
     Attributes
@@ -138,22 +173,15 @@ class SobolAnswer(ShortRepr, Reported):
     (128, True)
     """
 
-    inputs: tuple[str, ...]
-    distributions: tuple[str, ...]
     quantities: tuple[SpreadQuantity, ...]
     limits: tuple[KeptLimit, ...]
     samples: int
-    seed: int
-    members: int
-    failed: int
-    fault: str
-    infinite: tuple[str, ...]
     base: np.ndarray
     values: np.ndarray
 
     def _report(self) -> Report:
         from ballpass.runtime.ask.drawn_members import fault_of
-        from ballpass.runtime.ask.variance_shares import FEWEST, wilson
+        from ballpass.runtime.ask.variance_shares import FEWEST
 
         parts: list[Any] = []
         rows = []
@@ -185,15 +213,6 @@ class SobolAnswer(ShortRepr, Reported):
                 f"{limit.words}: kept by {limit.kept} of {limit.members} members, {100.0 * limit.share:.4g} % (95 % "
                 f"interval {100.0 * limit.low:.4g} to {100.0 * limit.high:.4g} %)"
             )
-        warned = [*self.infinite]
-        if self.failed:
-            low, high = wilson(self.failed, self.members)
-            warned.append(
-                f"{self.failed} of {self.members} members have no result "
-                f"({rounded(100.0 * low, 2)} to {rounded(100.0 * high, 2)} %). They were left out with "
-                "those that they are compared with: all numbers are of inputs that can be "
-                f"simulated. The first: {self.fault}"
-            )
         facts = {
             **self._named("inputs", "distributions"),
             "quantities": [asdict(one) for one in self.quantities],
@@ -207,7 +226,7 @@ class SobolAnswer(ShortRepr, Reported):
             facts=facts,
             records=records,
             index=("quantity", "input"),
-            warnings=warned,
+            warnings=self._warnings(),
             fault=fault_of(self.failed, self.members, known),
         )
 
@@ -275,14 +294,7 @@ def sobol(
     """
     from scipy.stats.qmc import Sobol
 
-    from ballpass.runtime.ask.drawn_members import (
-        check_count,
-        infinite_words,
-        read_inputs,
-        run_members,
-        values_of,
-        words_of,
-    )
+    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_drawn, values_of
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.variance_shares import variance_shares, wilson
     from ballpass.runtime.quantity.grammar import quantities_of
@@ -300,18 +312,13 @@ def sobol(
     rows = [a]
     if indices:
         rows += [b, *(np.where(np.arange(count) == k, b, a) for k in range(count))]
-    with shown("simulating", progress) as tell:
-        values, faults = run_members(
-            model,
-            tuple(inputs),
-            np.concatenate(rows),
-            names,
-            cycles=cycles,
-            transient=transient,
-            parameters=parameters,
-            keep=keep,
-            progress=tell,
-        )
+    values, facts = run_drawn(
+        *(model, inputs, np.concatenate(rows), names, seed, progress),
+        cycles=cycles,
+        transient=transient,
+        parameters=parameters,
+        keep=keep,
+    )
     base = values[: 2 * samples] if indices else values
     quantities = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
@@ -341,16 +348,10 @@ def sobol(
         share = hits / len(known) if len(known) else math.nan
         kept.append(KeptLimit(words=words, kept=hits, members=len(known), share=share, low=low, high=high))
     return SobolAnswer(
-        inputs=tuple(inputs),
-        distributions=tuple(words_of(one) for one in inputs.values()),
+        **facts,
         quantities=tuple(quantities),
         limits=tuple(kept),
         samples=samples,
-        seed=seed,
-        members=len(values),
-        failed=len(faults),
-        fault=faults[0] if faults else "",
-        infinite=infinite_words(names, values),
         base=np.concatenate(rows[:2]),
         values=base,
     )
