@@ -185,8 +185,8 @@ def test_the_number_known_better_is_given_and_none_where_nothing_is_known(
     ("own", "second", "uncertainty", "stated"),
     [
         (1e-9, 1.0005, 1e-7, 5e-4),  # the second is that far away, and known to be
-        (1e-9, 1.0005, 1e-3, 4e-9),  # it may be where the first is
-        (1e-3, 1.0005, 1e-3, 4e-3),
+        (1e-9, 1.0005, 1e-3, 8e-9),  # it may be where the first is
+        (1e-3, 1.0005, 1e-3, 8e-3),
     ],
 )
 def test_the_stated_uncertainty_reaches_to_a_number_that_excludes_the_derivative(
@@ -203,6 +203,7 @@ def test_the_stated_uncertainty_reaches_to_a_number_that_excludes_the_derivative
     ("scene", "quantity", "parameter"),
     [
         ("punching_press", "mean:ball.force[5]", "bearing.ball_diameter"),
+        ("punching_press", "mean:ball.elastic_force", "bearing.outer_ring.damping"),
         ("punching_press_roller", "drive_work", "mechanism.gravity"),
         ("eccentric_pump", "mean:ball.elastic_force", "mechanism.bodies.rod_3.mass"),
     ],
@@ -210,12 +211,12 @@ def test_the_stated_uncertainty_reaches_to_a_number_that_excludes_the_derivative
 def test_the_stated_uncertainty_covers_the_derivative_of_a_run_at_the_tightest_tolerances(
     make_model: Callable[..., Model], scene: str, quantity: str, parameter: str
 ) -> None:
-    """Of a hundred random pairs those whose two tolerances are nearest each other and farthest from the limit."""
+    """Of 188 random pairs those whose two tolerances are nearest each other and farthest from the limit."""
     model = make_model(scene)
     pair = model.sensitivity(quantity, parameter).pairs[0]
     tight = model.sensitivity(quantity, parameter, rtol=1e-13, sensitivity_rtol=1e-12, check=False).pairs[0]
     assert pair.uncertainty is not None
-    assert abs(pair.derivative - tight.derivative) <= pair.uncertainty < 2e-4 * abs(pair.derivative)
+    assert abs(pair.derivative - tight.derivative) <= pair.uncertainty < 1e-3 * abs(pair.derivative)
 
 
 @pytest.mark.parametrize(("own", "second"), [(1.6e-2, 1e-9), (1e-9, 1.6e-2), (3e-2, 3e-2), (0.0, 1.0)])

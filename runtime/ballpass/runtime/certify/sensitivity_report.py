@@ -50,7 +50,7 @@ class Sensitivity:
     dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
     scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
         zero, what positions move by in the run, or the largest value of its unit
-    uncertainty : of the derivative, same unit: four times its distance from that of a run at a looser tolerance, and
+    uncertainty : of the derivative, same unit: eight times its distance from that of a run at a looser tolerance, and
         from the difference of both routes' values of the quantity; None where the check was turned off
     route : the route that gave the derivative: ``steps``, or that of the check
     by_steps : derivative of the steps, same unit
