@@ -143,4 +143,5 @@ def test_a_scene_without_a_bearing_has_nothing_to_trade(ballpass: Callable[..., 
     (site / "bare.toml").write_text(bare, encoding="utf-8")
     done = ballpass("trade", "bare.toml")
     assert done.exit_code == 2
-    assert "no bearing" in done.output
+    assert "this scene has no states" in done.output
+    assert not (site / "generated" / "bare").exists()

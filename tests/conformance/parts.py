@@ -353,6 +353,85 @@ def _dyads() -> list[Part]:
     ]
 
 
+# scenes without states: a driver at constant speed, and no bearing
+
+_SLIDER_CRANK = """
+[mechanism]
+gravity = "9.81 m/s^2"
+
+[mechanism.driver]
+joint = "A"
+speed = "60 rad/s"
+
+[mechanism.frame.points]
+A = "origin"
+
+[mechanism.bodies.crank]
+mass = "0.4 kg"
+inertia = "300 kg*mm^2"
+center_of_mass = "20 mm"
+points = { A = "origin", B = "50 mm" }
+
+[mechanism.bodies.rod]
+mass = "0.6 kg"
+inertia = "1500 kg*mm^2"
+center_of_mass = "60 mm"
+points = { B = "origin", C = "160 mm" }
+
+[mechanism.bodies.slider]
+mass = "1.2 kg"
+center_of_mass = "origin"
+points = { C = "origin" }
+
+[mechanism.joints.A]
+type = "revolute"
+bodies = ["frame", "crank"]
+
+[mechanism.joints.B]
+type = "revolute"
+bodies = ["crank", "rod"]
+
+[mechanism.joints.C]
+type = "revolute"
+bodies = ["rod", "slider"]
+branch = "ahead"
+
+[mechanism.joints.guide]
+type = "prismatic"
+bodies = ["frame", "slider"]
+points = ["A", "C"]
+direction = "0 deg"
+
+[mechanism.forces.work]
+body = "slider"
+point = "C"
+force = ["900 N", "0 N"]
+window = { start = "20 deg", end = "150 deg" }
+
+[run]
+cycles = 2
+transient_cycles = 1
+outputs = ["reaction.*", "drive_torque"]
+"""
+
+
+def without_bearing(scene: str) -> str:
+    """A shipped scene without its bearing."""
+    text = shipped(scene)
+    head, _, rest = text.partition("[bearing]")
+    return head + rest[rest.index("[run]") : rest.index("outputs = ")] + 'outputs = ["reaction.*", "drive_torque"]\n'
+
+
+WITHOUT_STATES = {"slider_crank": _SLIDER_CRANK, "four_bar": without_bearing("four_bar")}
+
+#: Scenes without bearings whose driver's motion is a state.
+_SPEED = 'speed = "60 rad/s"'
+DRIVER_IS_A_STATE = {
+    "torque": _SLIDER_CRANK.replace(_SPEED, f'{_SPEED}\ntorque = {{ law = "constant", torque = "25 N*m" }}'),
+    "table": _SLIDER_CRANK.replace(_SPEED, 'table = { time = ["0 s", "1 s"], speed = ["60 rad/s", "60 rad/s"] }'),
+}
+
+
 #: One of each kind of force, drive, effect, law, dyad and contact, which the quick tests take; the long ones take all.
 QUICK = (
     *("damping law one-sided", "damping law tangent", "damping law hunt-crossley"),

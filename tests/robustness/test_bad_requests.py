@@ -286,7 +286,7 @@ def test_a_function_of_no_name_is_none_that_a_model_has(model: Model) -> None:
 def test_growth_of_a_model_without_states_is_refused(tmp_path: Path) -> None:
     linkage = PRESS.partition("[bearing]")[0]
     still = load(generate(scene_from_text(linkage, "linkage"), tmp_path / "linkage"))
-    with pytest.raises(RequestError, match="linkage: growth is that of a motion that is integrated"):
+    with pytest.raises(RequestError, match="growth: this scene has no states"):
         still.growth(1)
 
 

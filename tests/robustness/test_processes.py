@@ -727,12 +727,14 @@ def test_a_relative_cache_folder_is_found_from_wherever_the_process_goes(
 LOADING = """
     import sys
     from pathlib import Path
+    from ballpass.runtime.app.commands.load_scene import read_asked
     from ballpass.runtime.app.commands.shared import load_model
 
     print("ready", flush=True)
     wrong = 0
     for _ in range(int(sys.argv[3])):
-        model = load_model(Path(sys.argv[1]), lambda name: None, "none", overrides={})
+        scene = Path(sys.argv[1])
+        model = load_model(scene, lambda name: None, "none", asked=read_asked(scene, None))
         wrong += abs(model.parameters["bearing.clearance"] - float(sys.argv[2])) > 1e-12
     print(wrong)
 """

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.life_report import _oscillation, life_report
+from ballpass.runtime.ask.life_report import _oscillation
 from ballpass.runtime.ask.wear import LoadSamples, wear_field
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import DutyInfo, LubricationInfo
@@ -19,7 +19,6 @@ from ballpass.runtime.ratings import groove_slip, life
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of
 from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import depth_of_pass
-from ballpass.runtime.run.request import Request
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +114,7 @@ def test_film_and_dirt_change_the_governing_life(press: Model, monkeypatch: pyte
 def test_a_scene_without_bearing_is_refused(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(press, "manifest", replace(press.manifest, bearings=()))
     with pytest.raises(RequestError, match="no bearing"):
-        life_report(press, {}, Request(cycles=4))
+        press.life(cycles=4)
 
 
 @pytest.mark.long

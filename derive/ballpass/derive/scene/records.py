@@ -535,6 +535,12 @@ class Scene:
         return tuple(quantities_of((self.mechanism, self.shaft, self.loads, self.bearings)))
 
     @property
+    def integrated(self) -> bool:
+        """Whether it has states: bearings, or a driver whose motion is not known as a constant speed."""
+        driver = None if self.mechanism is None else self.mechanism.driver
+        return bool(self.bearings) or (driver is not None and (driver.table or driver.torque) is not None)
+
+    @property
     def coupled(self) -> bool:
         """Whether bearings act back on the linkage."""
         return any(bearing.coupling == "two-way" for bearing in self.bearings)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.summary_words import row_place, row_words, written
+from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import parse_quantity, quantity_words
 from ballpass.runtime.ratings.of_bearing import bearing_words
@@ -39,6 +40,9 @@ _RUN = {
     "samples": "their samples: {}",
     "growth": "a start moved by the tolerance changes results by {}",
 }
+
+#: Those that say nothing where nothing is integrated.
+_INTEGRATION = ("rtol", "steps", "wall_time")
 
 
 def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: bool = False) -> tuple[ReportTable, int]:
@@ -167,10 +171,11 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
 
 
 def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str:
+    still = summary["method"] == NOT_INTEGRATED
     run = [
         words.format(_of_run(key, summary[key]["value"]))
         for key, words in _RUN.items()
-        if key in summary and summary[key]["value"] is not None
+        if key in summary and summary[key]["value"] is not None and not (still and key in _INTEGRATION)
     ]
     laws = {
         key.removesuffix("damping_law").removesuffix("."): law
@@ -185,5 +190,5 @@ def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
     sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []
-    method = f"{summary['method']}, "
-    return f"{method}{', '.join(run + sampled + law)}." + (f"\n{', '.join(tools)}." if every else "")
+    method = "all follows from the driver's angle: nothing is integrated" if still else summary["method"]
+    return f"{', '.join([method, *run, *sampled, *law])}." + (f"\n{', '.join(tools)}." if every else "")

@@ -63,11 +63,10 @@ class ForcingPeriod:
 
 
 def refuse_free_driver(manifest: Manifest, question: str) -> None:
-    """Refuse a scene without states, and one where the driver's motion or a cage's lag is a state: no period."""
-    if not manifest.initial or (manifest.mechanism is not None and manifest.mechanism.angle):
-        why = "the driver's motion is a state" if manifest.initial else "nothing is integrated"
+    """Refuse a scene where the driver's motion or a cage's lag is a state: no period."""
+    if manifest.mechanism is not None and manifest.mechanism.angle:
         raise RequestError(
-            f"{question}: {why} in this scene. Allowed: bearings, and a driver or shaft at constant speed."
+            f"{question}: the driver's motion is a state in this scene. Allowed: a driver or shaft at constant speed."
         )
     if any(coordinate.kind == "lag" for coordinate in manifest.coordinates):
         raise RequestError(

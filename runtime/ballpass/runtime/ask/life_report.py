@@ -16,7 +16,6 @@ from ballpass.runtime.ask.life_limits import limits_of
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, RingStrength, StateStrength
 from ballpass.runtime.ask.life_text import LifeReport
 from ballpass.runtime.ask.wear import LoadSamples, load_samples, wear_field
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import BearingInfo, DutyInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -53,11 +52,6 @@ def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Re
         The computation failed.
     """
     manifest = model.manifest
-    if not manifest.bearings:
-        raise RequestError(
-            "life: this scene has no bearing. Allowed: a scene with [bearing] or [bearings.<name>]. Its joints' "
-            "reactions, which a bearing would carry, are outputs of `ballpass run`."
-        )
     states = manifest.duty or (DutyInfo(name="", share=1.0, parameters=()),)
     judged = [_state(model, {**parameters, **dict(state.parameters)}, state, request) for state in states]
     return LifeReport(

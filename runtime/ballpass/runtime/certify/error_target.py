@@ -27,6 +27,7 @@ import numpy as np
 from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, motion_of, stepper_run
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
@@ -106,8 +107,7 @@ def simulate_to_error(
     TargetMissed
         No way meets the target.
     """
-    if not model.states:
-        raise RequestError("This model has no states; its outputs follow from time alone, without an error.")
+    refuse_still("error", integrated=model.manifest.integrated)
     quantities = compared_quantities(model, of)
     run = stepper_run(model, numbers, request)
     check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before a search that may take long

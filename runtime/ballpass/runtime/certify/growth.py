@@ -21,8 +21,9 @@ import numpy as np
 
 from ballpass.runtime.certify.method_choice import MethodChoice, stepper_run
 from ballpass.runtime.contract.defaults import TOLERANCES
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -155,11 +156,7 @@ def find_growth(
     SimulationError
         The computation failed.
     """
-    if not model.states:
-        raise RequestError(
-            f"{model.manifest.scene}: growth is that of a motion that is integrated. This model has no states: its "
-            "outputs follow from time alone. A scene with [bearing] or [mechanism.driver.torque] has some."
-        )
+    refuse_still("growth", integrated=model.manifest.integrated)
     run = stepper_run(model, numbers, request)
     way = _way(run, request.kinks)
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]

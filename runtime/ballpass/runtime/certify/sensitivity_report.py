@@ -13,6 +13,7 @@ from typing import Any, Literal
 from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.quantity.values import QuantityValue
@@ -335,8 +336,9 @@ def _remarks(report: SensitivityReport) -> list[Words]:
         )
         for pair in report.disagreements
     ]
-    tolerance = report.settings["sensitivity_rtol"]
-    if tolerance is not None:
+    if report.settings["method"] == NOT_INTEGRATED:
+        lines.append("all follows from the driver's angle: nothing is integrated")
+    elif report.settings["sensitivity_rtol"] is not None:
         lines.append(
             "values of a run by {method}, relative tolerance {rtol:.0e}, kinks {kinks}, {steps} steps; "
             "derivatives at tolerance {sensitivity_rtol:.0e}".format(**report.settings)

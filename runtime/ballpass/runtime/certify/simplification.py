@@ -19,6 +19,7 @@ from ballpass.runtime.certify.method_choice import MethodChoice, compared_quanti
 from ballpass.runtime.certify.trade import MEMBERS, SPREAD, perturbed, reference
 from ballpass.runtime.certify.trade_report import PROMISED, milliseconds, percent
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
@@ -126,8 +127,8 @@ def measure_simplification(
     SimulationError
         A run of either model failed.
     """
-    if not (model.states and simpler.states):
-        raise RequestError("Both scenes need a bearing: without one there is nothing to integrate. Add a [bearing].")
+    for one in (model, simpler):
+        refuse_still(f"trade {one.manifest.scene}", integrated=one.manifest.integrated)
     if members < 2:
         raise RequestError(f"members: at least 2 are needed for a 95 % point, not {members!r}.")
     others = {info.name for info in simpler.manifest.parameters}

@@ -21,6 +21,7 @@ from ballpass.runtime.certify.trade_report import PROMISED, Measured, Trade
 from ballpass.runtime.contract.bounds import counts, outside, violations
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.method_registry import AUTO, CHOICE, METHODS, STEPPERS
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.contract.tableaus import RosenbrockTableau
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
@@ -128,10 +129,7 @@ def measure_trade(
     SimulationError
         There is no reference of a member.
     """
-    if not model.states:
-        raise RequestError(
-            "This scene has no bearing: its outputs follow from time alone, without a tolerance. Add a [bearing]."
-        )
+    refuse_still("trade", integrated=model.manifest.integrated)
     compared = compared_quantities(model, of)
     names, quantities = tuple(item.name for item in compared), QuantityRun(model, compared)
     if members < 2:

@@ -358,6 +358,11 @@ class Manifest(ShortRepr):
         return self.bearings[0] if self.bearings else None
 
     @property
+    def integrated(self) -> bool:
+        """Whether there are states; without them all follows from the driver's angle."""
+        return bool(self.initial)
+
+    @property
     def borders(self) -> tuple[int, ...]:
         """Inputs that are borders: of windows of an angle that is a state, and of stops."""
         return tuple(k for k, item in enumerate(self.inputs) if item.kind == "border")

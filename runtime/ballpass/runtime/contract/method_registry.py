@@ -36,3 +36,6 @@ CHOICE = "stepper"
 
 #: Names that users give: the choice, and each method.
 STEPPERS: Mapping[str, str] = {CHOICE: "auto", **{f"{CHOICE}-{name}": name for name in METHODS}}
+
+#: The method of a model without states, where all follows from the driver's angle.
+NOT_INTEGRATED = "none"

@@ -101,8 +101,9 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
     manifest, folder = model.manifest, model.folder
     if not manifest.states:
         raise RequestError(
-            f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
-            f"{folder / 'model.c'}. A scene with a bearing can be exported."
+            f"{manifest.scene}: the model has no states, because all follows from the driver's angle, so that there is "
+            "nothing to integrate. Name the scene file instead: `ballpass export` and `ballpass explore` derive it "
+            f"with the driver's speed as a table over time. The functions of this model are in {folder / 'model.c'}."
         )
     texts = {
         "scene.h": scene_header(manifest),

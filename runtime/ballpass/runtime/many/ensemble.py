@@ -38,7 +38,7 @@ from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.choose_method import stepper_method
+from ballpass.runtime.run.choose_method import choose_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.loop import RunFailed
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
@@ -228,7 +228,7 @@ def simulate_many(
     started = clocks.perf_counter()
     manifest = model.manifest
     chosen = _quantities(model, observables)
-    chosen_method = stepper_method(method or manifest.run.method)
+    chosen_method, _ = choose_method(model, method or manifest.run.method, stepper=True)
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
     at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance)
     workers = _threads(threads)

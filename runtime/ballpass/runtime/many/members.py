@@ -169,7 +169,7 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
             )
         columns |= {info.name: c[:, k] for k, info in enumerate(manifest.constants)}
     _check_knots(manifest, columns, refused)
-    initial = np.ascontiguousarray(np.column_stack([columns[name] for name in manifest.initial]))
+    initial = np.ascontiguousarray(np.reshape([columns[name] for name in manifest.initial], (-1, count)).T)
     members = Members(varied=varied, columns=columns, p=p, c=c, initial=initial, refused=refused)
     _check_assembly(model, members)
     return members

@@ -13,6 +13,7 @@ from typing import TypeVar
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import find_compiler, without_compiler
 from ballpass.runtime.native.driver_library import (
@@ -156,6 +157,7 @@ class LoadedModel(CompiledFunctions):
             if sources not in self._drivers:
                 compiler = find_compiler(self._compiler) if self.has_stepper else None
                 if compiler is None:
+                    refuse_still("The project's own stepper", integrated=self.manifest.integrated)
                     raise RequestError(self._without_stepper())
                 library = compile_driver(self.folder, self.manifest, compiler, sources)
                 self._drivers[sources] = kind(library, self.manifest)
@@ -167,11 +169,6 @@ class LoadedModel(CompiledFunctions):
         """What to say where the stepper is asked for and cannot be had."""
         if not self.compiled:
             return without_compiler("The project's own stepper")
-        if not self.states:
-            return (
-                "This integrates, and nothing in this scene moves freely: all follows from the driver's angle. Ask for "
-                "samples (simulate) or for quantities (quantities, ballpass run --of)."
-            )
         return (
             f"This needs the project's own stepper: the folder {self.folder} has no kernels for it. Write the folder "
             "again with `ballpass derive`, or run the model with method cvodes, for samples."

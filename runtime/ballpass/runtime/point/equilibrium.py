@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, real, vector
+from ballpass.runtime.contract.refused_scenes import refuse_without_bearings
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, JacobianDirections, Rows, contract, directions_of, rows_of
@@ -369,9 +370,9 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
         Nothing holds the rings.
     """
     if not model.has("static_forces"):
+        refuse_without_bearings("static_equilibrium", bearings=bool(model.manifest.bearings))
         raise RequestError(
-            "static_equilibrium: this model has no bearing, or its folder was written by an older version. A scene "
-            "with [bearing] is expected; `ballpass derive SCENE` writes the folder again."
+            "static_equilibrium: this folder was written by an older version. `ballpass derive SCENE` writes it again."
         )
     half = len(model.states) // 2
     there = point(model, numbers, t, np.zeros(2 * half))

@@ -362,8 +362,6 @@ def _is_constant(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> boo
 
 def _method(model: LoadedModel, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
     """The choice of ``auto`` for these rates and turns of `turn` [s], and why."""
-    if not model.states:
-        return "none", "the model has no states: its outputs follow from time alone"
     decay = max((s.decay for s in scales), default=0.0)
     frequency = max((s.frequency for s in scales), default=0.0)
     name, reason = choose_method(model, "auto")

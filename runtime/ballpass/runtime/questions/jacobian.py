@@ -116,5 +116,5 @@ def checked_jacobian(
 
     numbers = run_numbers(model, parameters)
     time = instant(model, numbers, t, crank_angle)
-    x = static_equilibrium(model, numbers, t=time).x if model.states and state == "equilibrium" else None
+    x = static_equilibrium(model, numbers, t=time).x if model.manifest.bearings and state == "equilibrium" else None
     return checked_jacobian(model, numbers, of, wrt, t=time, x=x, check=check)

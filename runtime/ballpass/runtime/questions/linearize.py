@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
 
 
-@Question(stage="linearize", runs=False)
+@Question(stage="linearize", runs=False, requires="states")
 def linearize(
     model: PointModel,
     t: Instant = None,

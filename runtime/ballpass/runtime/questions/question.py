@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, cleandoc, signature
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import options_of, refuse_faults, refuse_unknown
+from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
 from ballpass.runtime.report.report import Report
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Question:
     figures : of a model, an answer and overrides, by names of files
     steady : whether its numbers are those of the steady machine, so that what is not is warned of; where it finds
         parameters itself, a function of the answer that gives them
+    requires : what a scene must have for an answer: ``"states"`` or ``"bearings"``; empty for nothing
     always : whether figures are drawn into the folder of the results unless they are turned off; otherwise figures and
         ``<name>.json`` are written where a folder is given
     """
@@ -57,6 +59,7 @@ class Question:
     samples: bool = False
     takes_runs: bool = False
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
+    requires: Literal["", "states", "bearings"] = ""
     always: bool = False
     steady: bool | Callable[[Any], Mapping[str, float]] = False
 
@@ -67,8 +70,15 @@ class Question:
         if self.check is not None:
             self.check(values)
 
+    def refuse_scene(self, *, integrated: bool, bearings: bool) -> None:
+        """Refuse a scene that the question has no meaning for; the command does it before it derives."""
+        if self.requires == "bearings":
+            refuse_without_bearings(self.name, bearings=bearings)
+        elif self.requires:
+            refuse_still(self.name, integrated=integrated)
+
     def __call__(self, ask: _Function) -> _Function:
-        call = typed(ask)
+        call, question = typed(ask), replace(self, name=self.name or ask.__name__)
 
         @wraps(ask)
         def checked(*given: Any, **named: Any) -> Any:
@@ -77,11 +87,13 @@ class Question:
             refuse_faults(options_of(ask), values.arguments)
             self.refuse(values.arguments)
             refuse_unknown(options_of(ask), values.arguments)  # first, as the command line must
-            refuse_unknown(options_of(ask), values.arguments, next(iter(values.arguments.values())).manifest)
+            manifest = next(iter(values.arguments.values())).manifest
+            question.refuse_scene(integrated=manifest.integrated, bearings=bool(manifest.bearings))
+            refuse_unknown(options_of(ask), values.arguments, manifest)
             return call(*given, **named)
 
         checked.__doc__ = _with_options(ask)
-        _DECLARED[checked] = replace(self, name=self.name or ask.__name__)
+        _DECLARED[checked] = question
         return cast("_Function", checked)
 
 

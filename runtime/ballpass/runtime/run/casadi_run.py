@@ -9,6 +9,7 @@ import contextlib
 
 import numpy as np
 
+from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native import casadi_integrators
 from ballpass.runtime.native.kernel import EvaluationError
@@ -24,7 +25,7 @@ def integrate(run: Run, trajectory: Trajectory) -> None:
     Interrupted
         The integrator could not reach the end.
     """
-    if run.method == "none":
+    if run.method == NOT_INTEGRATED:
         trajectory.finished = len(trajectory.t)
         trajectory.passed = len(trajectory.segments.inputs)
         return

@@ -9,7 +9,7 @@ import warnings
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER
-from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.method_registry import NOT_INTEGRATED, STEPPERS
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
@@ -63,14 +63,24 @@ def method_names(model: LoadedModel) -> tuple[str, ...]:
     return (*(STEPPERS if model.has_stepper else ()), *(METHODS if model.has("rhs") else ()))
 
 
-def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
-    """Name of the method and the reason for it.
+def choose_method(model: LoadedModel, asked: str, *, stepper: bool = False) -> tuple[str, str]:
+    """Name of the method and the reason for it; `NOT_INTEGRATED` for a model without states, whatever was asked for.
+
+    Parameters
+    ----------
+    stepper : whether nothing but the project's own stepper will do
 
     Raises
     ------
     RequestError
         No such method, or the model was generated without it.
     """
+    if not model.states:
+        if asked not in (known := ("auto", *STEPPERS, *METHODS)) and asked != NOT_INTEGRATED:
+            raise RequestError(unknown_name("method", asked, known))
+        return NOT_INTEGRATED, "the model has no states: its outputs follow from time alone"
+    if stepper:
+        return stepper_method(asked), "asked for"
     if asked == "auto" and model.has_stepper:
         return "stepper", "the fastest method that a compiler allows"
     if asked in STEPPERS and model.has_stepper:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.method_registry import NOT_INTEGRATED, STEPPERS
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.driver_library import SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -93,6 +93,8 @@ def tight_below(manifest: Manifest) -> float:
 def check_located(asked: str, method: str) -> Kinks:
     """One of `CHOICES` that a method can follow; errors as for `choose_kinks`."""
     chosen = check_kinks(asked)
+    if method == NOT_INTEGRATED:  # no step is made
+        return STEPPED_OVER
     if chosen == LOCATED and method not in STEPPERS:
         raise RequestError(
             f"kinks = {LOCATED!r}: method {method} cannot end its steps on them. Allowed: {', '.join(STEPPERS)}. Take "

@@ -16,7 +16,7 @@ from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.choose_method import choose_method, stepper_method
+from ballpass.runtime.run.choose_method import choose_method
 from ballpass.runtime.run.locating import Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.request import Request, asked_length, check_length, run_length, tolerance
@@ -39,7 +39,7 @@ class Run:
     transient_cycles : turns from t = 0 on that do not count
     start : time from which on the run counts [s]
     initial : state at the start, shape (states,)
-    method, reason : name of the method, and why it was chosen; "none" for a model without states
+    method, reason : name of the method, and why it was chosen; `NOT_INTEGRATED` for a model without states
     rtol : relative tolerance [1]
     kinks : treatment of the kinks of the laws
     magnitude : of the states, shape (states,)
@@ -158,18 +158,11 @@ def resolve(
     asked = request.method or settings.method
     looked_at = min(duration, SCALED_TURNS * turn)
     magnitude = np.zeros(0)
-    if stepper:
-        method, reason = stepper_method(asked), "asked for"
-        if model.states:
-            magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
-    elif not model.states:
-        method, reason = "none", "the model has no states: its outputs follow from time alone"
-    else:
-        method, reason = choose_method(model, asked)
-        if method in STEPPERS:
-            magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
-        else:
-            magnitude = model_scales(model, numbers, initial, looked_at, turn, begin).magnitude
+    method, reason = choose_method(model, asked, stepper=stepper)
+    if method in STEPPERS:
+        magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
+    elif model.states:
+        magnitude = model_scales(model, numbers, initial, looked_at, turn, begin).magnitude
     return Run(
         model=model,
         numbers=numbers,

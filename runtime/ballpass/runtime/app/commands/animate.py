@@ -76,7 +76,7 @@ def animate(
         asked = read_asked(scene, set_, cycles, duration, transient)
         path = results_file(out, scene, f"animation.{format_}", MOVING)
         unknown = partial(refuse_unknown, options_in({"bearing": Shown}), {"bearing": bearing})
-        model = load_model(scene, stages, asked.method, None, rtol, overrides=asked.overrides, inspect=unknown)
+        model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,

@@ -298,7 +298,8 @@ def _source(
             raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")
         return load_solution(scene), {}
     asked = read_asked(scene, set_, *(values.get(name) for name in LENGTH if LENGTH[0] in values))
-    method = (values.get("method") or asked.method) if question.runs else "none"
+    question.refuse_scene(integrated=asked.integrated, bearings=asked.bearings)
+    method = (values.get("method") or asked.method) if question.runs else ""
     needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
     model = load_model(
         scene,
@@ -306,7 +307,7 @@ def _source(
         method,
         None,
         values.get("rtol"),
-        overrides=asked.overrides,
+        asked=asked,
         needs=needs,
         inspect=partial(refuse_unknown, options_of(ask), values),
     )

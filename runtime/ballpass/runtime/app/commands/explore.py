@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import re
 import tomllib
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
+from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words, speed_over_time
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
@@ -36,10 +37,12 @@ def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> No
         check_compiler()
         asked = read_asked(scene, None)
         path = results_file(out, scene, "explore.html", ("html",))
-        model = load_model(scene, stages, asked.method, overrides={})
-        stages("compile for pages")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        model.explore(path, units={} if scene.is_dir() else scene_units(scene, model.manifest))
+        over_time = scene.is_file() and not asked.integrated
+        with speed_over_time(scene, stages) if over_time else nullcontext(scene) as source:
+            model = load_model(source, stages, asked.method, asked=asked)
+            stages("compile for pages")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            model.explore(path, units={} if scene.is_dir() else scene_units(scene, model.manifest))
     show(f"{path} ({size_words(path.stat().st_size)})")
 
 

@@ -2,28 +2,29 @@
 
 With ``--fmu --input mechanism.driver.speed`` a scene whose driver turns at constant speed is derived with the speed as
 a table over time, whose rows are equal.  There the driver's angle and speed are states, so that the speed may change.
+A scene without states is derived so in both formats: there is nothing to integrate in it as it is.
 """
 
 from __future__ import annotations
 
 import shlex
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import (
-    Stages,
     check_folder,
     command,
     generated_folder,
     name_of,
     note,
     read_own,
+    speed_over_time,
     warn_of_scene,
 )
 from ballpass.runtime.contract.errors import RequestError
@@ -71,21 +72,29 @@ def export(
             from ballpass.runtime.native.compilers import need_compiler
 
             need_compiler("ballpass export --fmu")
-        manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
-        stages("export the FMU" if fmu else "export")
-        # here, because they import CasADi
-        if fmu:
-            from ballpass.runtime.export.fmu import export_fmu
-
-            if scene.is_file() and _speed_becomes_input(manifest, inputs or ()):
-                with _with_speed_over_time(scene, stages) as folder:
-                    export_fmu(folder, target, inputs=inputs or ())
-            else:
-                export_fmu(generated_folder(scene), target, inputs=inputs or (), manifest=manifest)
+        chosen = tuple(inputs or ())
+        over_time = scene.is_file() and not read_asked(scene, None).integrated
+        if over_time:
+            chosen = (*chosen, SPEED) if fmu else chosen
+            note(
+                "all follows from the driver's angle in this scene. Angle and speed are states of what is written, and "
+                f"the speed is {'an input' if fmu else 'a table over time'}."
+            )
         else:
-            from ballpass.runtime.export.c_program import export_c
+            manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
+            over_time = scene.is_file() and _speed_becomes_input(manifest, chosen)
+        with speed_over_time(scene, stages) if over_time else nullcontext(generated_folder(scene)) as folder:
+            manifest = read_artefact(folder) if over_time else manifest
+            stages("export the FMU" if fmu else "export")
+            # here, because they import CasADi
+            if fmu:
+                from ballpass.runtime.export.fmu import export_fmu
 
-            export_c(generated_folder(scene), target, manifest=manifest)
+                export_fmu(folder, target, inputs=chosen, manifest=manifest)
+            else:
+                from ballpass.runtime.export.c_program import export_c
+
+                export_c(folder, target, manifest=manifest)
         warn_of_scene(manifest)
     typer.echo(str(target))
     if c:
@@ -97,31 +106,3 @@ def _speed_becomes_input(manifest: Manifest, inputs: Sequence[str]) -> bool:
     """Whether the inputs include the driver's speed of a scene in which that speed is constant."""
     mechanism = manifest.mechanism
     return mechanism is not None and not mechanism.angle and not {SPEED, "mechanism.driver"}.isdisjoint(inputs)
-
-
-@contextmanager
-def _with_speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
-    """Folder, for the time of the context, of a scene file with its driver's constant speed as a table of time.
-
-    Raises
-    ------
-    RequestError
-        The scene has a feature that a driver with a table of its speed does not allow.
-    """
-    from ballpass.derive import SceneError, generate, read_scene
-
-    mechanism = read_scene(scene).mechanism
-    assert mechanism is not None
-    speed = f"{mechanism.driver.speed.value!r} rad/s"
-    table = {"time": ["0 s", "1 s"], "speed": [speed, speed]}
-    # states of a duty cycle may set the speed by its old name, and are for lives alone
-    changes = {"mechanism": {"driver": {"speed": None, "table": table}}, "duty": None}
-    try:
-        changed = read_scene(scene, changes=changes)
-    except SceneError as error:
-        raise RequestError(
-            f"input {SPEED!r}: with a speed that changes, here [mechanism.driver.table], this scene is refused. Leave "
-            f"the speed a parameter, or correct this:\n{error}"
-        ) from error
-    with tempfile.TemporaryDirectory() as place:
-        yield generate(changed, Path(place) / scene.stem, progress=stages)

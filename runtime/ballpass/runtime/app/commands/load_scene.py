@@ -34,9 +34,18 @@ RUN_OPTIONS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """Data of a scene that a command needs before it has a model: its method, numbers of ``--set`` by path [SI]."""
+    """Data of a scene that a command needs before it has a model.
+
+    Attributes
+    ----------
+    method : of the scene
+    integrated, bearings : whether it has states, and bearings
+    overrides : numbers of ``--set`` by path [SI]
+    """
 
     method: str
+    integrated: bool
+    bearings: bool
     overrides: dict[str, float]
 
 
@@ -54,15 +63,20 @@ def read_asked(
     """
     if path.is_dir():
         present = read_manifest(path)
-        return Asked(method=present.run.method, overrides=_overrides_of(present, settings or []))
+        return asked_of(present, _overrides_of(present, settings or []))
     from ballpass.derive.emit.signature import fresh_manifest
 
     manifest = fresh_manifest(path)
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
-        return Asked(method=manifest.run.method, overrides=overrides)
+        return asked_of(manifest, overrides)
     _, scene, overrides = read_with_settings(path, settings, cycles, duration, transient)
-    return Asked(method=scene.run.method, overrides=overrides)
+    return asked_of(scene, overrides)
+
+
+def asked_of(of: Scene | Manifest, overrides: dict[str, float]) -> Asked:
+    """Data of a scene as read, or of a fresh manifest."""
+    return Asked(method=of.run.method, integrated=of.integrated, bearings=bool(of.bearings), overrides=overrides)
 
 
 def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:

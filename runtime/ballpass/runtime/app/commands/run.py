@@ -34,6 +34,7 @@ from ballpass.runtime.contract.options import (
     options_in,
     refuse_unknown,
 )
+from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
 from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
@@ -150,6 +151,10 @@ def run(
         start = _read_start(initial)
         # the transient of a run that goes on counts from the start of the first
         asked = read_asked(scene, set_, cycles, duration, transient if initial in (None, "equilibrium") else 0.0)
+        for flag in (flag for flag, value in (("--error", error), ("--turns", turns)) if value is not None):
+            refuse_still(flag, integrated=asked.integrated)
+        if initial == "equilibrium":
+            refuse_without_bearings("--initial equilibrium", bearings=asked.bearings)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
         needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
@@ -159,7 +164,7 @@ def run(
             method or asked.method,
             kinks,
             rtol,
-            overrides=asked.overrides,
+            asked=asked,
             needs=needs and f"ballpass run {needs}",
             inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
         )

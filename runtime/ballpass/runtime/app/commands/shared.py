@@ -11,10 +11,11 @@ import contextlib
 import math
 import os
 import sys
+import tempfile
 import textwrap
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -34,6 +35,7 @@ from ballpass.runtime.report.text import show as show_report
 from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
+    from ballpass.runtime.app.commands.load_scene import Asked
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
 
@@ -320,7 +322,7 @@ def load_model(
     kinks: str | None = None,
     rtol: float | None = None,
     *,
-    overrides: Mapping[str, float],
+    asked: Asked,
     needs: str = "",
     inspect: Callable[[Manifest], None] | None = None,
 ) -> Model:
@@ -328,9 +330,9 @@ def load_model(
 
     Parameters
     ----------
-    overrides : numbers of ``--set``; refused where the linkage locks with them
+    asked : of the scene; numbers of ``--set`` are refused where the linkage locks with them
     needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
-        derived; empty for others
+        derived; empty for others.  A scene without states needs no stepper
     inspect : see `read_own`: refuses names that the model does not have
     """
     from ballpass.runtime.contract.method_registry import STEPPERS
@@ -338,7 +340,7 @@ def load_model(
     from ballpass.runtime.native.compilers import need_compiler
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
 
-    if needs or method in STEPPERS:
+    if asked.integrated and (needs or method in STEPPERS):
         need_compiler(needs or f"method {method}")
 
     def compiled(folder: Path) -> Model:
@@ -346,11 +348,42 @@ def load_model(
         return load(folder)
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
-    if any(path.startswith("mechanism.") for path in overrides):
-        model.check_assembly(overrides)
+    if any(path.startswith("mechanism.") for path in asked.overrides):
+        model.check_assembly(asked.overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol
         chosen = choose_kinks(kinks, "stepper" if method == "auto" else method, model.manifest, tolerance)
         _ = stepper_for(model, chosen)
     return model
+
+
+@contextlib.contextmanager
+def speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
+    """Folder, for the time of the context, of a scene file with its driver's constant speed as a table of time.
+
+    The driver's angle and speed are states there, so that there is something to integrate, and the speed may change.
+
+    Raises
+    ------
+    RequestError
+        The scene has a feature that a driver with a table of its speed does not allow.
+    """
+    from ballpass.derive import SceneError, generate, read_scene
+    from ballpass.runtime.export.model_description import SPEED
+
+    mechanism = read_scene(scene).mechanism
+    assert mechanism is not None
+    speed = f"{mechanism.driver.speed.value!r} rad/s"
+    table = {"time": ["0 s", "1 s"], "speed": [speed, speed]}
+    # states of a duty cycle may set the speed by its old name, and are for lives alone
+    changes = {"mechanism": {"driver": {"speed": None, "table": table}}, "duty": None}
+    try:
+        changed = read_scene(scene, changes=changes)
+    except SceneError as error:
+        raise RequestError(
+            f"{SPEED}: with a speed that changes, here [mechanism.driver.table], this scene is refused. Leave "
+            f"the speed a parameter, or correct this:\n{error}"
+        ) from error
+    with tempfile.TemporaryDirectory() as place:
+        yield generate(changed, Path(place) / scene.stem, progress=stages)

@@ -38,7 +38,7 @@ def stream(
         stages("read")
         asked = read_asked(scene, set_, cycles, duration, 0.0)
         unknown = partial(refuse_unknown, options_in({"of": Of}), {"of": of})
-        model = load_model(scene, stages, asked.method, None, rtol, overrides=asked.overrides, inspect=unknown)
+        model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
         stages("simulate")
         statistics = model.stream(
             out,

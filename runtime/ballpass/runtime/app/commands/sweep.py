@@ -15,6 +15,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import (
+    asked_of,
     read_asked,
     read_formats,
     read_with_settings,
@@ -141,10 +142,8 @@ def sweep(
         length = (cycles, None, transient) if duration is None else ()
         if scene.is_dir():
             source, overrides = read_manifest(scene), read_asked(scene, set_).overrides
-            usual = source.run.method
         else:
-            read, source, overrides = read_with_settings(scene, set_, *length)
-            usual = read.run.method
+            _, source, overrides = read_with_settings(scene, set_, *length)
         ranges = read_ranges(source, vary or [], overrides)
         folder = results_folder(out, scene)
         figures, formats = figures and can_draw(), read_formats(format_)
@@ -155,10 +154,10 @@ def sweep(
             model = load_model(
                 scene,
                 stages,
-                method or usual,
+                method or source.run.method,
                 kinks,
                 rtol,
-                overrides=overrides,
+                asked=asked_of(source, overrides),
                 needs="ballpass sweep",
                 inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
             )

@@ -66,7 +66,7 @@ def _figures(_model: AnyModel, found: Trade | Simplification, _parameters: Any) 
         yield f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}", draw_trade(found, quantity)
 
 
-@Question(report=_report, stage="measuring", figures=_figures, always=True)
+@Question(report=_report, stage="measuring", figures=_figures, always=True, requires="states")
 def trade(
     model: AnyModel,
     *,
