@@ -136,6 +136,39 @@ def test_derivatives_and_optima_are_those_of_the_closed_form(still: Model) -> No
     assert angle.value.item() == pytest.approx(by_angle[0], rel=1e-5)
 
 
+def test_a_fit_of_exact_data_says_that_there_is_no_noise(still: Model) -> None:
+    """It divided by zero."""
+    angles = np.arange(400) * (2.0 * np.pi / 400) + 0.003
+    for loss, profile in (("linear", False), ("huber", True)):
+        run = still.simulate(times=angles / 60.0, parameters={MASS: 1.47}, transient=0)
+        found = still.fit(
+            {"time": run.t, "drive_torque": run["drive_torque"]}, f"{MASS}=1 kg:2 kg", loss=loss, profile=profile
+        )
+        (number,), report = found.numbers, found.report()
+        assert number.value == pytest.approx(1.47, rel=1e-12)
+        assert number.deviation < 1e-13
+        assert report.fault == ""
+        assert list(report.warnings) == []
+        assert found.signals[0].exact
+        text = to_text(report)
+        assert "no noise" in text
+        assert "none, but for rounding" in text
+
+
+def test_a_signal_that_the_model_does_not_explain_is_a_fault(still: Model) -> None:
+    times = np.arange(400) / 4000.0
+    alien = 5.0 * np.random.default_rng(3).standard_normal(400)
+    for more in ({}, {"gain": True, "offset": True}):
+        found = still.fit({"time": times, "drive_torque": alien}, f"{MASS}=1 kg:2 kg", **more).report()
+        assert "explains nothing of drive_torque" in found.fault
+        assert any("as large as the signal's own deviation" in words for words in found.warnings)
+    noisy = drive_torque(60.0 * times) + alien
+    fine = still.fit({"time": times, "drive_torque": noisy}, f"{MASS}=1 kg:2 kg")
+    assert fine.report().fault == ""
+    (number,) = fine.numbers
+    assert abs(number.value - 1.2) < 4.0 * number.deviation
+
+
 def test_data_sets_and_spectra_are_those_of_the_closed_form(still: Model, tmp_path: Path) -> None:
     import xarray
 

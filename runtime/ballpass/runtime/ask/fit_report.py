@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Differences from quantities in their deviations from which on the report warns of them [1].
 FAR = 3.0
 
+#: Differences below this share of a signal's rms, or deviations of a number, are rounding [1].
+ROUNDING = 1e-12
+
 #: Correlation of two unknowns from which on the report names it.
 CORRELATED = 0.9
 
@@ -104,7 +107,41 @@ class FittedSignal:
         >>> model.fit(data, "bearing.clearance=5 um:30 um").signals[0].white
         True
         """
-        return self.axis == "quantity" or abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
+        return self.axis == "quantity" or self.exact or abs(self.correlation) < 4.0 / math.sqrt(len(self.t))
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing but rounding is left of the differences.
+
+        Examples
+        --------
+        >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+        >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+        >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+        >>> model.fit(data, "bearing.clearance=5 um:30 um").signals[0].exact
+        False
+        """
+        return bool(self.noise <= ROUNDING * np.sqrt(np.mean(self.measured**2)))
+
+    def unexplained(self, unknowns: int) -> bool:
+        """Whether the differences are as large as the signal's own deviation about its mean, or larger.
+
+        Parameters
+        ----------
+        unknowns : of the fit: so many more or less explain something of any noise
+
+        Examples
+        --------
+        >>> run = model.simulate(duration=0.05, sample_rate=10e3)
+        >>> noise = 1e-8 * np.random.default_rng(1).standard_normal(len(run.t))
+        >>> data = {"time": run.t, "inner.y": run["inner.y"] + noise}
+        >>> model.fit(data, "bearing.clearance=5 um:30 um").signals[0].unexplained(1)
+        False
+        """
+        samples = len(self.t)
+        if self.axis == "quantity":
+            return False
+        return bool(self.noise**2 * (samples - 1) >= np.var(self.measured) * (samples - unknowns))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -164,6 +201,8 @@ class FitAnswer(ShortRepr, Reported):
         said += [
             f"Differences of {one.name}: {one.noise:.3g} of their deviations, or of values without one"
             if one.axis == "quantity"
+            else f"Noise of {one.name}: none, but for rounding"
+            if one.exact
             else f"Noise of {one.name}: {_shown(one.noise, one.unit)}, "
             f"{rounded(100.0 * one.noise / float(np.std(one.measured)), 2)} % of the signal"
             for one in self.signals
@@ -186,6 +225,13 @@ class FitAnswer(ShortRepr, Reported):
                 f"Other values fit as well within the noise, SI: {listed}. The intervals do not reach to them. Give "
                 "narrower bounds, more data, or a part of the record that depends less on its start."
             )
+        nothing = [one.name for one in self.signals if one.unexplained(len(self.numbers))]
+        warned += [
+            f"{name}: the differences are as large as the signal's own deviation about its mean, or larger. The model "
+            "explains nothing of it: check its column, its unit and the time of its start (begin), or give wider "
+            "bounds, more starts or a shift."
+            for name in nothing
+        ]
         warned += [
             f"{one.name}: each difference is correlated with the next one ({one.correlation:.2f}). Intervals hold for "
             "white noise: the model leaves something out, or the noise is filtered. They are too narrow then."
@@ -216,6 +262,8 @@ class FitAnswer(ShortRepr, Reported):
             **self._named("rivals", "loss", "profile", "rtol", "converged"),
         }
         fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."
+        if nothing:
+            fault = f"The model explains nothing of {', '.join(nothing)}: no number of this fit can be relied on."
         records = [asdict(one) for one in self.numbers]
         return Report(parts=(table, *said), facts=facts, records=records, index=("name",), warnings=warned, fault=fault)
 
@@ -230,6 +278,8 @@ def _row(one: FittedNumber) -> tuple[str, ...]:
         return one.name, "", "", "not determined", ""
     if one.held:
         return one.name, f"{one.value / one.factor:.6g}", "", "end of its range", printed_unit(one.shown_unit)
+    if one.deviation <= ROUNDING * abs(one.value):
+        return one.name, f"{one.value / one.factor:.13g}", "0", "no noise", printed_unit(one.shown_unit)
     digits = max(3, 3 + math.floor(math.log10(max(abs(one.value) / one.deviation, 1.0))))
     low, value, high = (
         "bound" if math.isnan(number) else f"{number / one.factor:.{digits}g}"

@@ -209,6 +209,8 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
     from scipy.stats import t as student
 
     noise = np.array([record.noise for record in misfit.records])
+    # of exact data, as another run of the model, no more is known than the rounding of the numbers
+    least = np.finfo(float).eps * np.array([np.max(np.abs(record.values)) for record in misfit.records])
     counts = start
     samples = sum(len(record.values) for record in misfit.records)
     for weighing in range(WEIGHINGS):
@@ -217,11 +219,11 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
         whole, jacobian = weighted.differences(counts), weighted.jacobian(counts)
         ends = np.cumsum([len(record.values) for record in misfit.records])[:-1]
         parts = [size * part for size, part in zip(noise, np.split(whole, ends), strict=True)]
-        found = np.array([_size(part, loss) for part in parts])
+        found = np.maximum([_size(part, loss) for part in parts], least)
         # quantities are few in a trial, and have deviations or values to be counted in: of one size in all trials
         few = [k for k, record in enumerate(misfit.records) if record.axis == "quantity"]
         if few:
-            found[few] = _size(np.concatenate([parts[k] for k in few]), loss)
+            found[few] = max(_size(np.concatenate([parts[k] for k in few]), loss), float(np.max(least[few])))
         done = np.all(np.abs(found / noise - 1.0) < SAME_NOISE) or (loss == "linear" and len(parts) == 1)
         if progress is not None:
             progress((weighing + 1) / WEIGHINGS)
@@ -233,6 +235,7 @@ def fit_unknowns(misfit: Misfit, start: np.ndarray, loss: str, progress: Callabl
         for one, c in zip(misfit.unknowns, counts.tolist(), strict=True)
     )
     scale, steepness = _scale(loss, whole, samples - len(counts))
+    scale = max(scale, float(np.min(least / noise)) ** 2)
     covariance, blind = determine(misfit, counts, jacobian, scale / steepness, held)
     return Fitted(
         counts=counts,

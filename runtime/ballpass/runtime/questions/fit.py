@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Distance of each start from the bounds, in shares of the range [1].
 INSIDE = 0.05
 
+#: Counts nearer than this are the same: a search ends so far from the least misfit [1].
+SAME = 1e-8
+
 #: Candidates of which each start is the best; the scene's values are the first.
 CANDIDATES = 8
 
@@ -312,7 +315,8 @@ def _is_rival(misfit: Misfit, best: Fitted, other: Fitted) -> bool:
     """Whether another search ended elsewhere, and as well within the noise."""
     samples = np.array([len(record.values) for record in misfit.records])
     worse = 2.0 * float(samples @ np.log(other.noise / best.noise))
-    away = np.abs(other.counts - best.counts) > best.spread * np.sqrt(np.diag(best.covariance))
+    reach = np.maximum(best.spread * np.sqrt(np.diag(best.covariance)), SAME)
+    away = np.abs(other.counts - best.counts) > reach
     return worse < best.spread**2 and bool(np.any(away & (np.array(best.held) == "")))
 
 
