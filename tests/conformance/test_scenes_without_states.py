@@ -111,6 +111,13 @@ def test_members_are_those_of_the_closed_form(still: Model) -> None:
     assert screened.deviation == pytest.approx(0.0, abs=1e-6)
 
 
+def test_what_does_not_vary_has_no_shares(still: Model) -> None:
+    """Shares of the variance of rounding had numbers."""
+    found = still.sobol(f"{MASS}=1 kg:2 kg", "drive_work", samples=16)
+    assert found.quantities[0].shares == ()
+    assert "drive_work is the same in all members" in to_text(found.report())
+
+
 def test_derivatives_and_optima_are_those_of_the_closed_form(still: Model) -> None:
     report = still.sensitivity("max:drive_torque", [SPEED, MASS])
     assert [pair.check.verdict.value for pair in report.pairs] == ["verified", "verified"]

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.variance_shares import VarianceShare
 
+#: Differences below this share of a value are rounding [1].
+ROUNDING = 1e-12
+
 #: Quantiles in the report.
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -208,6 +211,8 @@ class SobolAnswer(DrawnAnswer):
                 )
                 parts.append(ReportTable(title=title, heads=("input", *shares), rows=cells, caption=caption))
             records += [{"quantity": one.name, "input": name, **asdict(s)} for name, s in ranked]
+            if not _varies(np.array([one.least, one.most])):
+                parts.append(f"{one.name} is the same in all members: no input has a share in its variance.")
         for limit in self.limits:
             parts.append(
                 f"{limit.words}: kept by {limit.kept} of {limit.members} members, {100.0 * limit.share:.4g} % (95 % "
@@ -241,6 +246,11 @@ def _figures(_model: AnyModel, found: SobolAnswer, _parameters: object) -> Itera
     for k, one in enumerate(found.quantities):
         name = "sobol" if k == 0 else f"sobol_{k + 1}"
         yield name, draw_shares(one.name, one.unit, found.inputs, one.shares, found.values[:, k])
+
+
+def _varies(values: np.ndarray) -> bool:
+    """Whether values differ by more than rounding, or are unknown."""
+    return not np.ptp(values) <= ROUNDING * np.max(np.abs(values))
 
 
 def _check(values: Mapping[str, Any]) -> None:
@@ -334,7 +344,7 @@ def sobol(
                 least=float(np.min(known)),
                 most=float(np.max(known)),
                 quantiles=tuple(np.quantile(known, QUANTILES).tolist()),
-                shares=variance_shares(blocks[0], blocks[1], blocks[2:], seed) if indices else (),
+                shares=variance_shares(blocks[0], blocks[1], blocks[2:], seed) if indices and _varies(known) else (),
             )
         )
     kept = []
