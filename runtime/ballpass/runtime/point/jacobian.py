@@ -147,6 +147,8 @@ def check_directions(manifest: Manifest, names: Sequence[str]) -> dict[str, str]
         for name in names
         if name not in (*units, STATES)
     ]
+    if STATES in names and not manifest.integrated:
+        faults.append("wrt: this scene has no states. Give parameters, 'time' or 'crank_angle'.")
     if faults:
         raise RequestError("\n".join(faults))
     return units
@@ -162,13 +164,9 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
     """
     manifest = model.manifest
     names = [wrt] if isinstance(wrt, str) else list(wrt)
+    units = check_directions(manifest, names)
     names = [item for name in names for item in (model.states if name == STATES else (name,))]
     rows = {name: row for row, name in enumerate(numbers.parameters)}
-    units = check_directions(manifest, names)
-    if not names and not model.states and wrt == STATES:
-        raise RequestError(
-            "wrt: this model has no states: a scene with [bearing] has. Give parameters, or 'crank_angle'."
-        )
     if not names:
         raise RequestError("wrt: nothing to differentiate by was named. Give a parameter, or 'states'.")
     count = len(names)
