@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import random
 import re
 import signal
 import subprocess
@@ -297,6 +298,52 @@ def test_a_mutated_scene_is_read_or_refused_in_words(name: str, data: st.DataObj
                 f"{number} {data.draw(st.sampled_from(['mm', 'kg', 's', 'rpm', 'N', 'deg', 'Hz', 'N*s/m', '']))}"
             )
     read_or_refused("\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items()))
+
+
+#: Faults of which one error makes several, each true by itself: every place that names what is gone, and where
+#: something is removed or emptied also keys that are missing, and a linkage that moves.
+NAMED = r"there is no |.* has no point"
+REPEATED = {"misspell": NAMED, "word": NAMED, "unit": NAMED}
+
+
+def one_error(rng: random.Random, tree: dict[str, Any]) -> str:
+    """Make one mistake somewhere in a scene: something removed or misspelt, a wrong type or unit; say which."""
+    path = rng.choice(places(tree))
+    table: Any = tree
+    for key in path[:-1]:
+        table = table[key]
+    last, given = path[-1], table[path[-1]]
+    kinds = ["remove", "type", *["misspell"] * isinstance(table, dict), *["unit", "word"] * isinstance(given, str)]
+    kind = rng.choice(kinds)
+    if kind == "remove":
+        del table[last]
+    elif kind == "misspell":
+        at = rng.randrange(len(last))
+        new = last[:at] + last[at + 1 :] if len(last) > 4 and rng.random() < 0.5 else f"{last[:at]}x{last[at:]}"
+        items = [(new if key == last else key, item) for key, item in table.items()]
+        table.clear()
+        table.update(items)
+    elif kind == "type":
+        table[last] = rng.choice([True, 3, 3.5, "text", [], {}])
+    else:
+        table[last] = given.split(" ")[0] + " rpm" if kind == "unit" else f"{given}x"
+    return f"{kind} {'.'.join(map(str, path))}"
+
+
+def test_one_error_of_a_scene_is_one_fault() -> None:
+    """A misspelt table made a fault of every key that names what it holds, a misspelt choice of keys that follow it."""
+    rng = random.Random(43)
+    single = 0
+    for _ in range(400):
+        tree = copy.deepcopy(TREES[rng.choice(NAMES)])
+        done = one_error(rng, tree)
+        found = read_or_refused("\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items()))
+        if isinstance(found, SceneError):
+            single += len(found.faults) == 1
+            allowed = REPEATED.get(done.split()[0], rf"{NAMED}|this (key|table) is missing|.* mobility")
+            others = [fault for fault in found.faults if not re.match(allowed, fault.problem)]
+            assert len(found.faults) == 1 or not others, f"{done}\n{found}"
+    assert single > 250
 
 
 @pytest.mark.long

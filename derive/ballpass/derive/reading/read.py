@@ -185,8 +185,9 @@ def _scene(
     faults = faults or duty_faults(scene)
     if not faults:
         return replace(scene, lines=collector.lines)
-    topology = ("mechanism.joints", "mechanism.driver")
-    if scene.mechanism is not None and not any(fault.key.startswith(topology) for fault in collector.faults):
+    topology, none = ("mechanism.joints", "mechanism.driver"), ("mechanism", "mechanism.bodies")
+    places = [fault.key for fault in collector.faults]
+    if scene.mechanism is not None and not any(key.startswith(topology) or key in none for key in places):
         # faults that the derivation would find next are reported with the rest
         from ballpass.derive.mechanism.assembly import assemble  # importing SymPy takes longer than reading most scenes
 
@@ -239,12 +240,15 @@ def _read(root: Table, name: str) -> Scene:
                 "",
                 "the scene has neither a mechanism nor a bearing",
                 allowed="[mechanism], [bearing] (or [bearings.<name>]) or both",
-                remedy="add one of the two tables",
+                remedy="add one of the two tables; [shaft] and [load] turn and load a bearing",
             )
         shaft = None
-        if mechanism is not None or not has_bearing:
-            _refuse_loads(root, "mechanism" if mechanism is not None else "")
-        else:
+        if mechanism is None and not _states_drive(root):
+            root.table("mechanism", "driver, frame, bodies and joints")
+            has_bearing = False
+        elif mechanism is not None:
+            _refuse_loads(root)
+        elif has_bearing:
             shaft = read_shaft(root.table("shaft", "speed"))
         loads = _read_loads(root, required=shaft is not None) if has_bearing else ()
         if shaft is not None and shaft.ring == "outer":
@@ -259,7 +263,7 @@ def _read(root: Table, name: str) -> Scene:
         given = root.data.get("run")
         turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
         transient = "transient_cycles" in turns
-        seated = not transient and not any(_states_start(root))
+        seated = not transient and not any(_states(root, "initial"))
         scene = Scene(
             name=name,
             title=title,
@@ -273,11 +277,16 @@ def _read(root: Table, name: str) -> Scene:
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
 
-def _states_start(root: Table) -> Iterator[bool]:
-    """Of each bearing: whether the scene says where its rings are at the start."""
+def _states_drive(root: Table) -> bool:
+    """Whether something turns and loads the bearings, or none of them names a joint."""
+    return any(key in root.data for key in ("shaft", "load", "loads")) or not any(_states(root, "joint"))
+
+
+def _states(root: Table, key: str) -> Iterator[bool]:
+    """Of each bearing: whether the scene gives this key."""
     several = root.data.get("bearings", {})
     for bearing in (root.data.get("bearing", {}), *(several.values() if isinstance(several, dict) else ())):
-        yield isinstance(bearing, dict) and "initial" in bearing
+        yield isinstance(bearing, dict) and key in bearing
 
 
 def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Sequence[Load]) -> int:
@@ -441,13 +450,14 @@ def _check_loads_beside(root: Table, loads: Sequence[Load], bearings: Sequence[B
         )
 
 
-def _refuse_loads(root: Table, because: str) -> None:
-    for key in ("shaft",) if because and (root.has("bearing") or root.has("bearings")) else ("shaft", "load", "loads"):
+def _refuse_loads(root: Table) -> None:
+    """A mechanism turns and loads its bearings; a bearing loaded one-way may have a load beside it."""
+    for key in ("shaft",) if root.has("bearing") or root.has("bearings") else ("shaft", "load", "loads"):
         if root.has(key):
             root.fault(
                 key,
-                "the mechanism turns the bearing" if because else "there is no bearing to turn and load",
+                "the mechanism turns the bearing",
                 given=f"[{key}]",
-                allowed=f"[{key}] only in a scene with [bearing]" + (" and without [mechanism]" if because else ""),
-                remedy=f"delete [{key}]" + (", or delete [mechanism]" if because else ", or add [bearing]"),
+                allowed=f"[{key}] only in a scene with [bearing] and without [mechanism]",
+                remedy=f"delete [{key}], or delete [mechanism]",
             )

@@ -18,6 +18,7 @@ from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.bearing_records import (
     BallEffect,
     Bearing,
+    Catalogue,
     Damping,
     EquivalentMass,
     InitialState,
@@ -35,6 +36,11 @@ from ballpass.derive.scene.units import show
 _NUMBERS = (
     *("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle"),
     *("contact_angle", "axial_displacement"),
+)
+#: Its other keys and tables.
+_TABLES = (
+    *("designation", "element", "fit", "contact", "damping", "inner_ring", "outer_ring", "initial", "cage"),
+    *("lubrication", "alignment"),
 )
 ELEMENT = ChoiceKey(
     words="Kind of the rolling elements",
@@ -73,7 +79,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
     """
     with table:
         keys = keys_of(Bearing)
-        table.know(*keys, "contact", "damping", "inner_ring", "outer_ring", "initial", "cage", *EFFECTS)
+        table.know(*keys, *keys_of(Catalogue), *_TABLES, *EFFECTS)
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
         element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
@@ -135,6 +141,8 @@ def _read_place(
     if joint is None:
         problem, allowed = f"there is no joint {show(name)}", listing(names)
         remedy = suggest(name, names, "name the driver's joint")
+    elif joint.kind is None or not joint.bodies:  # reported
+        return name, share
     elif coupling == "two-way" and joint.kind != "revolute":
         problem, remedy = "the bearing must sit at a revolute joint", "name one of these joints"
         given, allowed = (
@@ -184,8 +192,9 @@ def _refuse_angle(table: Table, element: RollingElement) -> None:
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:
     with table.table("damping", 'law = "tangent" and ratio = "0.25e-5 s"') as damping:
+        damping.know("law")
         name = LAW.read(damping, "law")
-        if name is None:
+        if name is None or name != damping.data["law"]:  # a guess does not say which keys belong here
             damping.know(*damping.data)
             return Damping(law="none", numbers=(), smoothing=None)
         law, known = LAWS[name], {"law": name, "numbers": ()}
@@ -233,8 +242,9 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
 
 def _read_outer_ring(table: Table) -> OuterRing | None:
     with table.table("outer_ring", 'support = "fixed"') as ring:
-        support, keys = SUPPORT.read(ring, "support"), keys_of(OuterRing)
-        ring.know(*keys)
+        keys = keys_of(OuterRing)
+        ring.know("support", *keys)
+        support = SUPPORT.read(ring, "support")
         if support == "elastic":
             return read_record(OuterRing, ring)
         if support == "fixed":

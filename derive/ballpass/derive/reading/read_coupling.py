@@ -28,6 +28,19 @@ BODY = TextKey(
 def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
     """Coupling of a bearing and its linkage; faults where the scene does not allow it."""
     coupling = keys_of(Bearing)["coupling"].read(table, "coupling")
+    ring = table.data.get("inner_ring")
+    two_way = "count" in table.data or (isinstance(ring, dict) and "body" in ring)
+    if mechanism is not None and two_way and not {"coupling", "share"} & table.data.keys():
+        table.fault(
+            "coupling",
+            "this key is missing",
+            given='count or body of the inner ring, as with coupling = "two-way"',
+            allowed='coupling = "two-way"; one-way, as by default, a bearing has a share and an inner ring with a mass',
+            remedy='add coupling = "two-way"',
+        )
+        return "two-way"
+    if (coupling is None or table.missing) and mechanism is not None:  # reported; other keys say what is meant
+        return "one-way" if "share" in table.data else "two-way"
     if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
         table.fault(
             "coupling",
@@ -73,6 +86,9 @@ def read_count(table: Table, coupling: str) -> SceneNumber | None:
 def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:
     """The body that carries the inner ring: at the frame the other one, where it is not named."""
     joint = next((j for j in mechanism.joints if j.name == name), None) if mechanism is not None else None
+    if mechanism is not None and joint is not None:
+        names = (FRAME, *(body.name for body in mechanism.bodies))
+        joint = joint if all(body in names for body in joint.bodies) else None
     with table.table("inner_ring", "body", required=False) as ring:
         ring.know("body")
         ring.refuse(
@@ -82,7 +98,9 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
             remedy="delete the key",
         )
         moving = [body for body in joint.bodies if body != FRAME] if joint is not None else []
-        if joint is None or not moving:  # what is wrong with its bodies was said where it was read
+        if (
+            joint is None or not moving or (ring.missing and "inner_ring" in table.data)
+        ):  # what is wrong with its bodies was said where it was read
             return str(BODY.read(ring, "body")) if ring.has("body") else ""
         if not ring.has("body"):
             if len(moving) == 1:
@@ -96,7 +114,7 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
             )
             return moving[0]
         body = BODY.read(ring, "body")
-        if body not in joint.bodies:
+        if body and body not in joint.bodies:
             ring.fault(
                 "body",
                 f"the joint {show(joint.name)} does not join this body",

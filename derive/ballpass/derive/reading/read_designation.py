@@ -20,6 +20,7 @@ from ballpass.derive.scene.units import show
 #: Bearing steel of rings and balls, where a designation gives the geometry.
 YOUNG_MODULUS, POISSON_RATIO = "207 GPa", 0.3
 RATINGS = keys_of(Catalogue)
+SIZES = ("balls", "ball_diameter", "pitch_diameter")
 DESIGNATION = TextKey(
     words="A bearing of the table", example="6204", optional=True, note="supplies the keys below that are not given"
 )
@@ -28,7 +29,10 @@ DESIGNATION = TextKey(
 def fill_by_designation(table: Table) -> Catalogue | None:
     """Fill in what the designation of a bearing gives; None where the scene takes nothing from a catalogue."""
     kind = _bearing_type(table) if table.has("designation") else None
+    lacks = kind is None and table.data.get("clearance") in GROUPS and not any(key in table.data for key in SIZES)
     group = _clearance_group(table, kind)
+    if lacks:  # reported with the clearance; what the designation gives is not missing as well
+        kind = bearing_types()["6204"]
     span = kind.clearance(group) if kind is not None and group else None
     if kind is not None:
         filled: dict[str, object] = {
@@ -55,8 +59,9 @@ def fill_by_designation(table: Table) -> Catalogue | None:
 
 
 def _bearing_type(table: Table) -> BearingType:
-    name = DESIGNATION.read(table, "designation")
-    types = bearing_types()
+    types, given = bearing_types(), table.data["designation"]
+    number = isinstance(given, int) and str(given) not in types
+    name = str(given) if number else DESIGNATION.read(table, "designation")
     if not name or name in types:
         return types[name or "6204"]
     others = [name for name, kind in types.items() if kind.element != "ball"]

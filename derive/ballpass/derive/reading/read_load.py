@@ -25,8 +25,9 @@ WINDOWS = {
 def read_load(table: Table, name: str = "") -> Load | None:
     """A load on the inner rings; `name` of ``[loads.<name>]``."""
     with table:
+        table.know("type", *WINDOWS)
         kind = TYPE.read(table, "type")
-        if kind is None:
+        if kind is None or kind != table.data["type"]:
             table.know(*table.data)
             return None
         phase = table.data.get("phase")

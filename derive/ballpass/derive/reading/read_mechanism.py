@@ -13,7 +13,7 @@ from ballpass.derive.drive import LAWS
 from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
-from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_point
+from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_points
 from ballpass.derive.scene.keys import ChoiceKey, VectorKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, number, read_record
@@ -56,9 +56,11 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
     revolute joint from the frame to a body; names; and what `Table` notes.
     """
     with table:
+        table.know("gravity", "driver", "frame", "bodies", "joints", *(kind.key for kind in FORCE_TABLES))
         gravity = GRAVITY.read(table, "gravity")
         driver = _read_driver(table)
         with table.table("frame", "its points") as frame:
+            frame.know("points")
             frame_points = _read_points(frame, FRAME)
         bodies = _read_bodies(table)
         points: dict[str, list[str]] = {FRAME: [point.name for point in frame_points]}
@@ -74,6 +76,7 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
 
 def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
+        driver.know(*keys_of(Driver), "table", "torque", "flywheel")
         by_torque = driver.has("torque")
         joint, start = (keys_of(Driver)[name].read(driver, name) for name in ("joint", "start_angle"))
         speed, over_time = _read_table(driver) if driver.has("table") else (None, None)
@@ -104,8 +107,9 @@ def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None
 
 def _read_torque(driver: Table) -> TorqueLaw | None:
     with driver.table("torque", f"law: {listing(list(LAWS))}") as data:
+        data.know("law")
         name = LAW.read(data, "law")
-        if name is None:
+        if name is None or name != data.data["law"]:
             data.know(*data.data)
             return None
         return read_record(LAWS[name], data)
@@ -121,6 +125,7 @@ def _read_flywheel(driver: Table, changing: bool) -> SceneNumber:
             remedy="delete the flywheel, or add [mechanism.driver.torque]",
         )
     with driver.table("flywheel", "inertia") as wheel:
+        wheel.know("inertia")
         return FLYWHEEL.read(wheel, "inertia")  # type: ignore[no-any-return]
 
 
@@ -167,8 +172,7 @@ def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
     branch = BRANCH.read(data, "branch")
     joint = read_record(Joint, data, fill, name=name, branch=branch, **({} if is_guide else {"direction": None}))
     good = check_two_bodies(data, joint.bodies, points, "a joint of a body with itself") and joint.kind is not None
-    for body, point in zip(joint.bodies, joint.points, strict=False):
-        refuse_unknown_point(data, "points", body, point, points)
+    refuse_unknown_points(data, joint, points)
     if joint.kind == "revolute":
         remedy = 'delete the key, or write type = "prismatic"'
         data.refuse(("direction",), "a revolute joint has no direction", remedy=remedy)
@@ -177,7 +181,7 @@ def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
 
 def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound: list[str]) -> str | None:
     """Name of the driven body; None, with a fault, where the driver turns none."""
-    if not driver.joint:
+    if not driver.joint or not joints:  # reported
         return None
     names = [joint.name for joint in joints]
     joint = next((joint for joint in joints if joint.name == driver.joint), None)

@@ -9,7 +9,7 @@ from ballpass.derive.scene.keys import NamesKey, TextKey
 from ballpass.derive.scene.table import FRAME, Table, listing, suggest
 from ballpass.derive.scene.units import show
 
-#: Names of the points of every body and of the frame.
+#: Names of the points of every body and of the frame; none, and no body, where their table has a fault.
 Points = Mapping[str, Sequence[str]]
 
 
@@ -21,8 +21,8 @@ POINTS = NamesKey(words="A point of each body", example='["anchor", "tip"]')
 
 def refuse_unknown_body(data: Table, key: str, body: str, points: Points) -> bool:
     """Note a fault where there is no such body; whether there is."""
-    if body in points:
-        return True
+    if body in points or len(points) == 1:  # that there are no bodies is a fault of their table
+        return body in points
     names = list(points)
     data.fault(
         key,
@@ -34,10 +34,17 @@ def refuse_unknown_body(data: Table, key: str, body: str, points: Points) -> boo
     return False
 
 
-def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: Points) -> None:
-    """Note a fault where a known body has no such point."""
-    if body not in points or point in points[body]:
-        return
+def refuse_unknown_points(data: Table, record: Any, points: Points) -> None:
+    """Note a fault for each body that has no such point, for one where the points are not named."""
+    for body, point in zip(record.bodies, getattr(record, "points", ()), strict=False):
+        if refuse_unknown_point(data, "points", body, point, points) and "points" not in data.data:
+            return
+
+
+def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: Points) -> bool:
+    """Note a fault where a known body has points, but not this one; whether it is so."""
+    if not points.get(body) or point in points[body]:
+        return False
     place = "mechanism.frame.points" if body == FRAME else f"mechanism.bodies.{body}.points"
     near = suggest(point, points[body], "")
     data.fault(
@@ -47,6 +54,7 @@ def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: P
         allowed=listing(points[body]),
         remedy=f"{near + ' Or ' if near else ''}add {show(point)} to [{place}], or name its point",
     )
+    return True
 
 
 def check_names(data: Table, record: Any, points: Points) -> None:
@@ -57,8 +65,7 @@ def check_names(data: Table, record: Any, points: Points) -> None:
             refuse_unknown_point(data, "point", record.body, record.point, points)
     if hasattr(record, "bodies"):
         check_two_bodies(data, record.bodies, points, "both ends are on one body")
-        for body, point in zip(record.bodies, getattr(record, "points", ()), strict=False):
-            refuse_unknown_point(data, "points", body, point, points)
+        refuse_unknown_points(data, record, points)
 
 
 def check_moving_body(data: Table, body: str, points: Points) -> bool:

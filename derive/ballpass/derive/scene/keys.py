@@ -14,10 +14,11 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
 from typing import Any, ClassVar, Self
 
 from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, SceneNumber, UsualRange, Vector
-from ballpass.derive.scene.table import Table, listing, suggest
+from ballpass.derive.scene.table import MAX_NAME, MISSPELT, Table, listing, suggest
 from ballpass.derive.scene.units import COMMON, show
 from ballpass.runtime.contract.units import unit_size
 
@@ -248,8 +249,11 @@ class ColumnKey(QuantityKey):
         values, suffix = given, ""
         if isinstance(given, dict):
             with table.table(name) as column:
+                column.know("values", "unit")
                 values = column.take("values", "[0, 1]")
                 suffix = TextKey(example=self.unit).read(column, "unit")
+                if suffix and not table.collector.is_unit((*table.path, name, "unit"), suffix, self.unit):
+                    return ()
             if values is None or not suffix:
                 return ()
         if not isinstance(values, list) or not values:
@@ -296,7 +300,7 @@ class WholeKey(Key):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceKey(Key):
-    """One of some words; None, with a fault, where it is none of them."""
+    """One of some words; with a fault the one that it is like, None where it is like none of them."""
 
     choices: Sequence[str]
 
@@ -315,7 +319,7 @@ class ChoiceKey(Key):
             return given
         remedy = suggest(given, self.choices, f'write for example {name} = "{self.choices[0]}"')
         self.refuse(table, name, "this is none of the choices", given, listing(self.choices), remedy)
-        return None
+        return next(iter(get_close_matches(str(given)[:MAX_NAME], self.choices, n=1, cutoff=MISSPELT)), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -340,7 +344,9 @@ class TextKey(Key):
     def value(self, table: Table, name: str, given: Any) -> Any:
         """The text."""
         if not isinstance(given, str):
-            return self.refuse(table, name, "this is not a text", given, "a text")
+            number = isinstance(given, int | float) and not isinstance(given, bool)
+            remedy = f'write {name} = "{show(given)}"' if number else ""
+            return self.refuse(table, name, "this is not a text", given, "a text", remedy)
         if not given.strip() and self.default != "":
             return self.refuse(table, name, "the text is empty", given, "a text that is not empty")
         if self.longest and (not given.isprintable() or len(given) > self.longest):
@@ -407,10 +413,14 @@ class VectorKey(Key):
     length_limits: Limits = NO_LIMITS
 
     @property
+    def _numbers(self) -> tuple[str, str]:
+        unit = self.unit
+        return {"m": ("6 mm", "2 mm"), "N": ("0 N", "196 N")}.get(unit, (f"0 {unit}", f"9.81 {unit}"))
+
+    @property
     def sample(self) -> str:
         """The forms that may stand in the file."""
-        unit = self.unit
-        first, second = {"m": ("6 mm", "2 mm"), "N": ("0 N", "196 N")}.get(unit, (f"0 {unit}", f"9.81 {unit}"))
+        first, second = self._numbers
         forms = ['"origin"'] if self.origin else []
         if self.axis:
             forms.append(f'"{first}"')
@@ -446,11 +456,17 @@ class VectorKey(Key):
             length, angle = (f"{part.capitalize()} of {self.words}" for part in self.polar)
             keys = (
                 QuantityKey(
-                    unit=self.unit, words=length, symbol=self.symbols[3], bounds=limits.bounds, remedy=limits.remedy
+                    unit=self.unit,
+                    words=length,
+                    symbol=self.symbols[3],
+                    example=self._numbers[1],
+                    bounds=limits.bounds,
+                    remedy=limits.remedy,
                 ),
                 QuantityKey(unit="rad", words=angle, symbol=self.symbols[4], example="30 deg"),
             )
             with table.table(name) as polar:
+                polar.know(*self.polar)
                 first, second = (key.read(polar, part) for key, part in zip(keys, self.polar, strict=True))
             return Vector(kind="polar", first=first, second=second)
         if isinstance(given, str) and given.strip() == "origin" and self.origin:

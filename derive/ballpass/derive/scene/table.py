@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from types import TracebackType
@@ -75,6 +75,12 @@ class Collector:
             self.fault(path, error.problem, given=error.given, allowed=error.allowed, remedy=remedy)
         return SceneNumber(path=name, value=value, unit=unit, description=description, latex=latex, limits=limits)
 
+    def is_unit(self, path: Path, given: str, unit: str) -> bool:
+        """Whether the unit of a column measures what `unit` does; noted once, at the unit, where not."""
+        noted = len(self.faults)
+        self.quantity(path, f"1 {given}", unit)
+        return len(self.faults) == noted
+
     def check_name(self, path: Path, name: str, what: str) -> None:
         """Note a fault where `name` cannot be the name of a body, joint, point or force."""
         if name == FRAME:
@@ -113,9 +119,6 @@ def upright(name: str) -> str:
 #: Likeness from which an unknown key is a missing one, misspelt: one fault, not two [1].
 MISSPELT = 0.75
 
-#: What is said of keys and tables that have to be there.
-NO_KEY, NO_TABLE = "this key is missing", "this table is missing"
-
 
 class Table:
     """A table of the file; as a context it reports the keys that were not read.
@@ -143,27 +146,13 @@ class Table:
     ) -> None:
         if kind is not None:
             return
-        absent = [key for key in self._known if key not in self._written]
-        unknown = [key for key in self.data if key not in self._known]
-        misspelt = {key: get_close_matches(key, absent, n=1, cutoff=MISSPELT) for key in unknown}
-        # a table decides which other keys belong beside it: of these nothing is known where it is misspelt
-        decides = any(near and isinstance(self.data[key], dict) for key, near in misspelt.items())
-        for key, near in misspelt.items():
-            if near or not decides:
-                self.fault(
-                    key,
-                    "unknown key",
-                    given=show(key),
-                    allowed=listing(self._known),
-                    remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
-                )
-                self._forget_missing(absent if decides else near)
+        for key in self.data:
+            if key not in self._known:
+                self._refuse_unknown(key, [known for known in self._known if known not in self._written])
 
-    def _forget_missing(self, keys: Sequence[str]) -> None:
-        """Take back that keys are missing: they are there, misspelt, or nothing is known of them."""
-        places = {".".join((*self.path, key)) for key in keys}
-        faults = self.collector.faults
-        faults[:] = [one for one in faults if not (one.key in places and one.problem in (NO_KEY, NO_TABLE))]
+    def _refuse_unknown(self, key: str, absent: Sequence[str]) -> None:
+        remedy = suggest(key, absent, "delete it, or move it to the table it belongs to")
+        self.fault(key, "unknown key", given=show(key), allowed=listing(self._known or absent), remedy=remedy)
 
     def fault(self, key: str, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:
         """Note a fault at `key`; the empty key means the table itself."""
@@ -177,18 +166,34 @@ class Table:
                 self.fault(key, problem, given=show(self.data[key]), allowed=allowed, remedy=remedy)
 
     def know(self, *keys: str) -> None:
-        """These keys belong here."""
-        self._known.extend(key for key in keys if key not in self._known)
+        """These keys belong here; `correct` those that are misspelt."""
+        new = [key for key in keys if key not in self._known]
+        self._known += new
+        self.correct(new)
+
+    def correct(self, keys: Collection[str]) -> None:
+        """Read an unknown key that is like a missing one of some keys as that, with one fault."""
+        meant: dict[str, str] = {}
+        missing = [key for key in keys if key not in self.data]
+        for key in (key for key in self.data if key not in self._known and key not in keys):
+            absent = [one for one in missing if one not in meant.values()]
+            near = get_close_matches(key, absent, n=1, cutoff=MISSPELT)
+            if near:
+                self._refuse_unknown(key, absent)
+                meant[key] = near[0]
+        if meant:
+            self.data = {meant.get(key, key): value for key, value in self.data.items()}
 
     def has(self, key: str) -> bool:
         """Whether the key is there; it belongs here from now on."""
-        self.know(key)
+        if key not in self._known:
+            self._known.append(key)
         return key in self.data
 
     def names(self, what: str, example: str = "") -> list[str]:
         """All keys, where they are names that the user chooses; with an example at least one is required."""
         for key in self.data:
-            self.know(key)
+            self.has(key)
             self.collector.check_name((*self.path, key), key, what)
         if example and not self.missing and not self.data:
             self.fault("", f"there is no {what} here", allowed=example, remedy=f"add {example}")
@@ -199,7 +204,7 @@ class Table:
         if self.has(key):
             return self.data[key]
         if not self.missing:
-            self.fault(key, NO_KEY, allowed=f"{key} = {example}", remedy=f"add {key} = {example}")
+            self.fault(key, "this key is missing", allowed=f"{key} = {example}", remedy=f"add {key} = {example}")
         return None
 
     def table(self, key: str, example: str = "", *, required: bool = True) -> Table:
@@ -210,7 +215,7 @@ class Table:
                 name = ".".join(path)
                 self.fault(
                     key,
-                    NO_TABLE,
+                    "this table is missing",
                     allowed=f"[{name}] with {example}" if example else f"[{name}]",
                     remedy=f"add the table [{name}]",
                 )

@@ -24,7 +24,7 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.body_keys import Points, check_names
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.read_keys import read_record
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import Driver, Force, Mechanism
 from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
@@ -196,6 +196,7 @@ class ForceTable:
 
     def read(self, data: Table, name: str, points: Points) -> Force:
         """One force of the table."""
+        data.correct([*(p.key for p in self.pathways if p.key), *(law.key for law in self.laws if law.key)])
         pathway = next((p for p in self.pathways if p.key and data.has(p.key)), self.pathways[-1])
         asked = [law for law in self.laws if law.key and data.has(law.key)]
         law = asked[0] if asked else self.laws[-1]
@@ -211,4 +212,6 @@ class ForceTable:
             data.missing = True  # the missing keys depend on the key that stays
             law = next(law for law in asked if law.factor == (column in data.data))
         fill = pathway.fill(name, str(data.data.get("body", "")))
+        if not asked and len(self.laws) > 1 and pathway.column not in data.data:  # a key of another law is not unknown
+            data.know(*(key for kind in (*self.pathways, *self.laws) for key in keys_of(kind, fill)))
         return Force(name=name, table=self.key, pathway=pathway.read(data, fill, points, law), law=law.read(data, fill))

@@ -12,7 +12,7 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import not_negative, positive, read_record
+from ballpass.derive.scene.read_keys import keys_of, not_negative, positive, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
@@ -56,16 +56,19 @@ class Friction(Law):
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
         """Viscous, or torque (force) with smoothing, or both."""
-        amount = fill["AMOUNT"]
-        _refuse_coefficient(data, amount)
+        keys, amount = keys_of(cls, fill), fill["AMOUNT"]
+        data.correct(keys)
+        refused = _refuse_coefficient(data, amount)
         found = read_record(cls, data, fill, **({} if amount in data.data else {"smoothing": None}))
-        if found.viscous is None and found.coulomb is None:
+        if not refused and not data.missing and found.viscous is None and found.coulomb is None:
             data.fault(
                 "",
                 f"neither viscous friction nor a {amount}",
                 allowed=f"viscous, {amount} with smoothing, or both",
                 remedy=f"add viscous, or {amount} and smoothing",
             )
+        if found.viscous is None and found.coulomb is None:
+            data.know(*keys)  # they belong to one of both
         return found
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
@@ -97,12 +100,14 @@ class Friction(Law):
             yield UsualInfo(names=(self.smoothing.path,), least=None, most=0.1, of=driver.speed.path, hint=hint)
 
 
-def _refuse_coefficient(data: Table, amount: str) -> None:
-    """Friction in proportion to a reaction: the reaction depends on that friction."""
+def _refuse_coefficient(data: Table, amount: str) -> bool:
+    """Friction in proportion to a reaction: the reaction depends on that friction; whether it is refused."""
+    given = [key for key in ("coefficient", "pin_radius") if key in data.data]
     data.refuse(
-        [key for key in ("coefficient", "pin_radius") if key in data.data],
+        given,
         "friction does not follow the reaction of its joint: that reaction depends on the friction itself",
         allowed=f"viscous, {amount} with smoothing, or both",
         remedy=f"give the {amount} that the mean reaction makes, coefficient x reaction"
         + (" x pin radius" if amount == "torque" else ""),
     )
+    return bool(given)

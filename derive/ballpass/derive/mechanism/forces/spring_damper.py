@@ -11,7 +11,7 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import not_negative, quantity, read_record
+from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
@@ -66,14 +66,16 @@ class SpringDamper(Law):
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
         """Stiffness with free length or angle, damping, or both; optionally a preload."""
-        free = f"free_{fill['SIZE']}"
-        if "stiffness" not in data.data and "damping" not in data.data:
+        keys, free = keys_of(cls, fill), f"free_{fill['SIZE']}"
+        data.correct(keys)
+        if not data.missing and "stiffness" not in data.data and "damping" not in data.data:
             data.fault(
                 "",
                 "neither stiffness nor damping",
                 allowed=f"stiffness with {free}, damping, or both",
                 remedy=f"add stiffness and {free}, or damping",
             )
+            data.know(*keys)  # they belong to one of both
         left_out = {} if "stiffness" in data.data else {"free": None, "cubic_stiffness": None}
         return read_record(cls, data, fill, **left_out)
 

@@ -141,7 +141,7 @@ class Windows(Law):
                     "one window where the load rises",
                     "give each window a force of its own, or leave out the rise",
                 )
-            elif not 2.0 * window.rise.value < width * (1.0 - 1e-12):
+            elif 2.0 * window.rise.value >= width * (1.0 - 1e-12):
                 checker.fault(
                     window.rise.path,
                     "the load cannot rise and fall within its window",
