@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import ballpass.derive
 import ballpass.runtime
 from ballpass.derive import check, derive, equations, generate, lower, read_scene
-from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.reading.read import parse_override, scene_from_text, with_values
 from ballpass.runtime import (
     BallpassError,
     Model,
@@ -277,6 +277,32 @@ def test_an_argument_of_a_wrong_type_is_refused_in_words(
 ) -> None:
     with pytest.raises(RequestError, match=words):
         call(model)
+
+
+@pytest.mark.parametrize("angle", [1e10, -1e10, 1e300])
+def test_an_angle_without_a_place_in_a_turn_is_refused_wherever_one_is_read(model: Model, angle: float) -> None:
+    """`jacobian --at-angle 1e300deg` was verified: neighbouring numbers there are further apart than a turn."""
+    assert math.ulp(angle) > 1e-6 > math.ulp(8e9)
+    path = "mechanism.driver.start_angle"
+    scene, changes = read_scene(PRESS_FILE), {"mechanism": {"driver": {"start_angle": f"{angle!r} rad"}}}
+    calls: list[Callable[[], object]] = [
+        lambda: read_scene(PRESS_FILE, changes=changes),
+        lambda: with_values(scene, {path: angle}),
+        lambda: parse_override(scene, f"{path}={angle * 180:g} deg"),
+        lambda: model.reduce(cycles=1, transient=0, parameters={path: angle}),
+        lambda: model.quantities(f"value:inner.y@{angle!r}rad", cycles=1, transient=0),
+    ]
+    for call in calls:
+        with pytest.raises(BallpassError, match=r"no place in a turn.*8\.6e\+09 rad"):
+            call()
+    done = CliRunner().invoke(
+        app, ["jacobian", PRESS_FILE, "--of", "rhs", "--wrt", "time", "--at-angle", f"{angle}rad"]
+    )
+    assert done.exit_code == 2
+    assert "no place in a turn" in done.stderr
+    assert with_values(scene, {path: 1e9}).mechanism is not None
+    members = model.simulate_many({path: [1e9, angle]}, ["peak_ball_force"], cycles=0.1, transient=0)
+    assert [(one.member, one.status) for one in members.failures] == [(1, "REFUSED")]
 
 
 def test_a_function_of_no_name_is_none_that_a_model_has(model: Model) -> None:

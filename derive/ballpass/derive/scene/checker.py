@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.quantity import SceneNumber
+from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 
 
 class Checker:
@@ -32,6 +33,8 @@ class Checker:
         problem = "" if bounds is None else bounds.problem(quantity.value)
         if bounds is not None and problem:
             self.fault(quantity.path, problem, self.show(quantity), bounds.allowed, quantity.limits.advice)
+        if quantity.unit == "rad" and abs(quantity.value) >= MOST_ANGLE:  # of a file, that is refused where it is read
+            self.fault(quantity.path, FAR_ANGLE, self.show(quantity), "", "give the angle without its whole turns")
 
     def window(self, start: SceneNumber, end: SceneNumber) -> None:
         """Two angles that differ, by less than a turn."""

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 
 #: Name of a bound, its words in messages, and the comparison that a value must satisfy.
 _BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (
@@ -70,6 +71,8 @@ def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) ->
         # an array for each of forty numbers would take longer than a short run
         if bad if isinstance(bad, bool) else bad.any():
             yield np.asarray(bad), f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
+        if info.unit == "rad" and np.any(far := abs(columns[info.name]) >= MOST_ANGLE):
+            yield np.asarray(far), f"{info.name}: {FAR_ANGLE}"
     for name in counts(manifest):
         bad = np.asarray(columns[name], dtype=float) % 1.0 != 0.0
         if bad.any():

@@ -37,6 +37,9 @@ _TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 MAX_LENGTH = 100
 #: Largest power of a unit; rational arithmetic with "m^1000000" would not end.
 MAX_EXPONENT = 12
+#: Angle from which on numbers are more than 1e-6 rad apart, so that none has a place in a turn [rad].
+MOST_ANGLE = 2.0**33
+FAR_ANGLE = f"so large an angle has no place in a turn; allowed are angles within {MOST_ANGLE:.1e} rad"
 
 
 class QuantityError(RequestError):
@@ -174,6 +177,8 @@ def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> f
         value = math.inf
     if not math.isfinite(value):
         raise refuse("the number is not finite", "give a finite number")
+    if unit == "rad" and abs(value) >= MOST_ANGLE:
+        raise refuse(FAR_ANGLE, "give the angle without its whole turns")
     if value == 0.0 and number != 0:
         raise refuse("the number is too small to differ from zero", 'write "0" where zero is meant')
     return value

@@ -15,6 +15,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE, BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
@@ -46,10 +47,17 @@ def named_place(quantity: Quantity) -> Moment:
     """The place written after ``@``: an angle or a time."""
     form = _PLACE.fullmatch(quantity.place)
     assert form is not None  # checked when read
-    number = float(form["number"])
     if form["unit"] == "s":
-        return Moment(kind="time", number=number)
-    return Moment(kind="angle", number=math.radians(number) if form["unit"] == "deg" else number)
+        return Moment(kind="time", number=float(form["number"]))
+    return Moment(kind="angle", number=_radians(form))
+
+
+def _radians(form: re.Match[str]) -> float:
+    number = float(form["number"])
+    angle = math.radians(number) if form["unit"] == "deg" else number
+    if abs(angle) >= MOST_ANGLE:
+        raise RequestError(f"@{form[0]}: {FAR_ANGLE}. Give the angle without its whole turns.")
+    return angle
 
 
 def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantity) -> tuple[float, Moment]:
@@ -218,8 +226,11 @@ def is_frequency(manifest: Manifest | None, place: str) -> bool:
 def is_instant(manifest: Manifest | None, place: str) -> bool:
     """Whether the part after ``@`` is a time, or an angle where something turns, as it does without a manifest."""
     form = _PLACE.fullmatch(place)
-    turning = manifest is None or manifest.mechanism is not None or bool(manifest.bearings)
-    return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
+    if form is None or form["unit"] not in ("deg", "rad"):
+        return form is not None and form["unit"] == "s"
+    return math.isfinite(_radians(form)) and (
+        manifest is None or manifest.mechanism is not None or bool(manifest.bearings)
+    )
 
 
 def check_first_turns(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
