@@ -118,6 +118,8 @@ def test_extremes_of_samples_alone_are_marked_where_they_stand(make_model: Calla
             assert highest[names.index(name)] == f"{unit * summary[name]['max']:z.4g}{mark}"
         assert str(peaks[names.index("peak_ball_force.total")]).endswith("*") == bool(mark)
         assert ("* of the samples alone" in str(table.caption)) == bool(mark)
+        first, *_ = stands_out(model.manifest, {**model.parameters, **model.constants()}, summary)
+        assert f"force: {rounded(summary['peak_ball_force']['total'])}{mark} N" in first
 
 
 def test_all_rows_of_two_bearings_are_one_table_of_80_columns(make_model: Callable[..., Model]) -> None:

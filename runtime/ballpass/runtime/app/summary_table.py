@@ -114,8 +114,7 @@ def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -
         return ""
     if abs(item[key]) < dust:
         return "0"
-    number = written(item, key, factor, "\n")  # ± below it: three of these fill a line
-    return number + ("*" if item.get("searched", {}).get(key) == "samples" and "±" not in number else "")
+    return written(item, key, factor, "\n")  # ± below it: three of these fill a line
 
 
 def _of_run(key: str, value: float) -> str:

@@ -64,18 +64,19 @@ def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> s
     """A number of the summary with four digits, or with those that hold over moved starts, and its uncertainty.
 
     That is twice the standard deviation over moved starts, or the distance of the number from their mean if they are of
-    the same turns.
+    the same turns.  A number of the samples alone, without an uncertainty, has a star: more samples may show more.
 
     Parameters
     ----------
     between : number and uncertainty
     """
     value, spread = item[key], item.get("over_starts", {}).get(key)
+    star = "*" if item.get("searched", {}).get(key) == "samples" else ""
     if spread is None or value == 0.0:
-        return rounded(factor * value)
+        return rounded(factor * value) + star
     apart = max(2.0 * spread["std"], abs(value - spread.get("mean", value)))
     if apart < 5e-5 * abs(value):  # all of four
-        return rounded(factor * value)
+        return rounded(factor * value) + star
     digits = min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(apart)) + 1, 1), 4)
     return f"{rounded(factor * value, digits)}{between}±{rounded(factor * apart, 1)}"
 

@@ -71,7 +71,7 @@ def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) ->
         # an array for each of forty numbers would take longer than a short run
         if bad if isinstance(bad, bool) else bad.any():
             yield np.asarray(bad), f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
-        if info.unit == "rad" and np.any(far := abs(columns[info.name]) >= MOST_ANGLE):
+        if info.unit == "rad" and np.any(far := np.abs(columns[info.name]) >= MOST_ANGLE):
             yield np.asarray(far), f"{info.name}: {FAR_ANGLE}"
     for name in counts(manifest):
         bad = np.asarray(columns[name], dtype=float) % 1.0 != 0.0
