@@ -198,7 +198,7 @@ class Model(PointModel, Questions):
             scene
         initial : state at the start, shape (states,); ``"equilibrium"`` for rings at rest under the load of t = 0, with
             the driver at its speed (`static_equilibrium`); or `Solution.end` of a run of this scene, whose time and
-            motion continue.  Default: the scene's
+            motion continue (``end.x``, its state alone, begins at t = 0).  Default: the scene's
         transient : turns from t = 0 on that `Solution.steady` leaves out, also where the run continues another one
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
             stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7

@@ -34,11 +34,12 @@ def start_of(model: LoadedModel, numbers: Numbers, initial: Initial) -> Start:
     """Start of a run; RequestError for an unknown word."""
     if initial is None or isinstance(initial, RunEnd):
         return initial
-    if not isinstance(initial, str):
+    if hasattr(initial, "__array__") or (isinstance(initial, Sequence) and not isinstance(initial, str)):
         return vector(initial)
     if initial != "equilibrium":
         raise RequestError(
-            f'initial: {initial!r} was given. Allowed: a state, "equilibrium", or the end of a run (Solution.end).'
+            f'initial: {initial!r:.60} ({type(initial).__name__}) was given. Allowed: a state, "equilibrium", or the '
+            "end of a run: Solution.end continues it from its time on, Solution.end.x is its state, to begin at t = 0."
         )
     from ballpass.runtime.point.equilibrium import start_at_rest  # with SciPy
 
