@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -308,6 +309,22 @@ def test_an_angle_without_a_place_in_a_turn_is_refused_wherever_one_is_read(mode
     assert with_values(scene, {path: 1e9}).mechanism is not None
     members = model.simulate_many({path: [1e9, angle]}, ["peak_ball_force"], cycles=0.1, transient=0)
     assert [(one.member, one.status) for one in members.failures] == [(1, "REFUSED")]
+
+
+def test_what_a_run_within_its_transient_is_told_to_do_can_be_done(model: Model) -> None:
+    """A run of one cycle of a scene without a run was told of 50 cycles to drop fewer than, and of no number."""
+    bare = PRESS.partition("[run]")[0]
+    for text in (f"{bare}[run]\ncycles = 1\ntransient_cycles = 50", PRESS.replace("cycles = 4 ", "cycles = 1 ")):
+        with pytest.raises(BallpassError, match="of 1 cycles") as caught:
+            scene_from_text(text, "short")
+        longer = re.search(r"cycles = (\d+) \(--cycles", str(caught.value))
+        assert longer is not None
+        assert scene_from_text(re.sub(r"\ncycles = 1\b", f"\ncycles = {longer[1]}", text), "long").run.cycles
+        assert scene_from_text(re.sub(r"transient_cycles = \d+", "transient_cycles = 0", text), "all").run.cycles == 1
+    with pytest.raises(RequestError, match=r"lies within its 2 transient cycles.*cycles = 12 .*--transient 0"):
+        model.reduce(cycles=1)
+    assert model.reduce(cycles=12)
+    assert model.reduce(cycles=1, transient=0)
 
 
 def test_a_function_of_no_name_is_none_that_a_model_has(model: Model) -> None:

@@ -48,6 +48,7 @@ from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names, names_of
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.defaults import STEADY_CYCLES
 from ballpass.runtime.contract.folders import read_file
 
 T = TypeVar("T", Bearing, Load)
@@ -61,9 +62,8 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
-#: Turns of a run whose length is not given, or a few more where loads repeat after several, and those before them that
-#: it drops: what is left is the steady machine.
-STEADY_CYCLES, DROPPED_CYCLES = 10, 50.0
+#: Turns before the steady ones of a run whose length is not given, which it drops.
+DROPPED_CYCLES = 50.0
 
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 

@@ -21,6 +21,7 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
 from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.units import split_setting
 
 #: Last parts of keys of the file that are no quantities, for the message about an override of one.
@@ -301,7 +302,7 @@ def _check_run(checker: Checker, scene: Scene) -> None:
     if source is not None and source.speed.value == 0.0 and run.cycles is not None:
         checker.fault(
             "run.cycles",
-            "nothing turns, so there are no cycles",
+            "the speed at the start is zero, so that no time is a cycle",
             f"{source.speed.path} = {checker.show(source.speed)}",
             "a duration where the speed is zero",
             'write duration = "0.5 s" instead of cycles (or run with --duration "0.5 s"), or give a speed',
@@ -314,5 +315,5 @@ def _check_run(checker: Checker, scene: Scene) -> None:
             "the transient cycles fill the whole run",
             f"{run.transient_cycles:g} of {turns:g} cycles{within}",
             "fewer cycles than the run has",
-            "run longer, or drop fewer cycles (--transient 0)",
+            longer_words(run.transient_cycles, turning=source is not None and source.speed.value != 0.0),
         )

@@ -5,6 +5,8 @@ A plain run (`Model.simulate`, `reduce`, `quantities`, `simulate_many`, `ballpas
 
 from __future__ import annotations
 
+import math
+
 #: Smallest and largest relative tolerance that can be asked for: below, rounding decides [1].
 TOLERANCES = (1e-13, 1e-1)
 
@@ -43,3 +45,14 @@ OPTIMUM_RTOL = 1e-8
 
 #: Runs of `fit`, each with derivatives by all that is fitted [1].
 FIT_RTOL = 1e-9
+
+#: Turns that count of a run whose length is not given, or a few more where loads repeat after several: those of the
+#: steady machine.
+STEADY_CYCLES = 10
+
+
+def longer_words(transient: float, *, turning: bool = True) -> str:
+    """What to do where nothing is left of a run behind its transient turns."""
+    cycles = math.floor(transient) + STEADY_CYCLES
+    longer = f"run longer, as cycles = {cycles} (--cycles {cycles}), or " if turning else ""
+    return f"{longer}leave out none (--transient 0; in a scene transient_cycles = 0)"

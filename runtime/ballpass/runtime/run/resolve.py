@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, real
@@ -110,7 +111,7 @@ def check_span(duration: float, turn: float, transient: float, begin: float = 0.
     if start >= end * (1.0 - 1e-9):
         raise RequestError(
             f"The run of {end / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
-            "Run more cycles, or set fewer transient ones."
+            f"Remedy: {longer_words(transient)}."
         )
     return start
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
@@ -223,7 +224,7 @@ class Solution:
             last = self.t[-1] if len(self.t) else 0.0
             raise RequestError(
                 f"The run of {last / self.cycle_length:g} cycles lies within its {self.transient_cycles:g} transient "
-                "cycles: nothing is left. Simulate more cycles, or set fewer transient ones."
+                f"cycles: nothing is left. Remedy: {longer_words(self.transient_cycles)}."
             )
         outputs = {name: samples[keep] for name, samples in self.outputs.items()}
         return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs, reductions=self.steady_reductions)
