@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 import re
@@ -49,7 +50,22 @@ PRESS_FILE = str(SCENES / "punching_press.toml")
 
 
 @pytest.mark.parametrize(
-    "value", [5, math.inf, None, [], {}, (), {5: 5}, {"x": 1}, b"x", 1j, object(), np.array([]), type, [[1]]]
+    "value",
+    [
+        *(5, math.inf, None, [], {}, (), {5: 5}, {"x": 1}, b"x", 1j, object(), np.array([]), type, [[1]]),
+        *(
+            10**5000,
+            [10**5000],
+            "x\0",
+            "\ud800",
+            "x" * 100_000,
+            {"x"},
+            np.array(1.0),
+            np.array("x\0"),
+            functools.reduce(lambda inner, _: [inner], range(3000), 0),
+        ),
+    ],
+    ids=lambda value: type(value).__name__,
 )
 def test_functions_of_both_packages_refuse_what_is_of_a_wrong_type(value: Any, tmp_path: Path) -> None:
     """Only methods of models did: of 1360 such calls about 1000 ended in a TypeError, AttributeError or ValueError."""
@@ -239,7 +255,7 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
         "exponent: True or False is expected, not 'no' ",
     ),
     (lambda m: m.bifurcation("bearing.clearance=1um:3um:2", parameters=5), "parameters: a mapping from name to value"),
-    (lambda m: m.bifurcation("bearing.clearance=1um:3um:2", settling=10**400), "settling: inf lies outside its bounds"),
+    (lambda m: m.bifurcation("bearing.clearance=1um:3um:2", settling=10**400), "settling: inf is no whole number"),
     (lambda m: m.checked_jacobian("rhs", "inner.x", state=5), r"state: a text is expected, not 5 \(int\)"),
     (lambda m: m.sensitivities("bearing.clearance", cycles=0.1, rtol="a"), "rtol: a number from 1e-13 to"),
     (lambda m: m.hessian("rhs", 5), "hessian: wrt must be a pair of names"),
@@ -266,6 +282,27 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: m.sensitivity("drive_work", cycles=0.1, progress=5), "progress: a function that takes .*, not 5 "),
     (lambda m: m.reduce(1, kinks=np.zeros(2)), "no choice of kinks array"),
     (lambda m: m.steady(parameters=5), r"parameters: a mapping from name to value is expected, not 5 \(int\)"),
+    (
+        lambda m: m.evaluate(0.0, outputs={"inner.y"}),
+        r"outputs: one name .* not {'inner.y'} \(set\)\. A set has no order",
+    ),
+    (lambda m: m.sensitivity({"drive_work"}, "bearing.clearance", cycles=0.1), r"of: one name .* A set has no order"),
+    (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", search="x"), "search: 'x' is none of the choices"),
+    (
+        lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", search=[]),
+        r"search: \[\] is none of the choices",
+    ),
+    (lambda m: m.spectrum("inner.x", envelope=[1]), r"envelope: \[1\] was given\. Allowed: two numbers \[Hz\]"),
+    (lambda m: m.spectrum("inner.x", sample_rate=0), "sample_rate: 0 Hz lies outside its bounds"),
+    (lambda m: m.explore("a\0b"), "up to 255 bytes, none of them NUL"),
+    (lambda m: m.stream("x" * 300, sample_rate=1e4, cycles=1), "path: a path is expected, not 'xxx.{0,60} .*255 bytes"),
+    (lambda m: m.stream("x/" * 3000, sample_rate=1e4, cycles=1), "path: a path is expected"),
+    (lambda m: m.steady(keep="a\0b"), "keep: a path is expected"),
+    (lambda m: m.simulate(10**5000), "cycles: a number above 0 is expected, not inf"),
+    (lambda m: m.evaluate([10**5000]), r"t: .* not \[inf\]"),
+    (lambda m: m.jacobian_function("rhs")("a"), r"x: 8 numbers are expected, not 'a' \(str\)"),
+    (lambda m: m.simulate(0.1)[["inner.x"]], r"no output or state \['inner\.x'\]"),
+    (lambda m: m.evaluate("x" * 100_000), "^.{0,400}$"),
     (lambda m: m.steady("a"), r"turns: 'a' \(str\) is no number\. Allowed: a number above 0"),
     (lambda m: QuantityFunction(m, "drive_work", 5), "wrt: one name or several"),
     (lambda m: QuantityFunction(m, "drive_work", "bearing.clearance", parameters=5), "parameters: a mapping"),
@@ -339,8 +376,19 @@ def test_growth_of_a_model_without_states_is_refused(tmp_path: Path) -> None:
 
 
 def test_names_may_be_given_in_any_kind_of_sequence(model: Model) -> None:
-    found = [model.evaluate(0.0, outputs=names) for names in ("inner.y", ["inner.y"], np.array(["inner.y"]))]
-    assert found == [{"inner.y": 0.0}] * 3
+    several = ("inner.y", ["inner.y"], np.array(["inner.y"]), np.array("inner.y"), {"inner.y": 1}.keys())
+    found = [model.evaluate(0.0, outputs=names) for names in (*several, (name for name in ["inner.y"]))]
+    assert found == [{"inner.y": 0.0}] * 6
+    of = (name for name in ["max:inner.y"])  # of a question, which looks at it more than once
+    assert model.sensitivity(of, "bearing.clearance", cycles=0.1, transient=0, check=False)
+
+
+@pytest.mark.parametrize("kind", [np.array, np.float64, np.float32])
+def test_numbers_may_be_those_of_numpy(model: Model, kind: Callable[[float], Any]) -> None:
+    assert model.evaluate(kind(0.5))["drive_torque"] == model.evaluate(0.5)["drive_torque"]
+    found, plain = (model.reduce(length, transient=np.array(0)) for length in (kind(0.5), 0.5))
+    assert found["inner.y"].maximum == plain["inner.y"].maximum
+    assert model.virtual_integrator(np.array(3)) is model.virtual_integrator(3)
 
 
 @pytest.mark.parametrize("length", [{"duration": 1e300}, {"cycles": 1e10}, {"cycles": 1e308}])

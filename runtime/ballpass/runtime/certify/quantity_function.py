@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, differentiate_unless_chaotic
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-from ballpass.runtime.contract.arguments import typed_methods
+from ballpass.runtime.contract.arguments import brief, typed_methods
 from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name, wrong_unit
@@ -305,8 +305,8 @@ class QuantityFunction:
             return np.asarray(x, dtype=float)
         except (TypeError, ValueError, OverflowError):
             raise RequestError(
-                f"parameters: an array of numbers, SI, is expected, not {x!r:.60} ({type(x).__name__}). A mapping from "
-                "names goes through `arguments`."
+                f"parameters: an array of numbers, SI, is expected, not {brief(x)} ({type(x).__name__}). A mapping "
+                "from names goes through `arguments`."
             ) from None
 
     def _rows(self, x: ArrayLike) -> tuple[Array, NDArray[np.int_], tuple[int, ...]]:

@@ -1,14 +1,18 @@
-"""Arguments of Python calls of a wrong type, refused where they enter by what their annotations say.
+"""Arguments of Python calls: made plain where they enter, and refused there where they are of a wrong type.
 
-Names, texts, paths and mappings are checked here; numbers where their bounds are known.
+In: a value and its annotation.  Out: what NumPy holds without a dimension as a plain value, names in anything that has
+an order as a tuple, an integer beyond all floats as infinite.  Names, texts, paths and mappings are checked here;
+numbers where their bounds are known.
 """
 
 from __future__ import annotations
 
 import functools
 import inspect
+import math
 import os
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, TypeVar, cast
@@ -17,6 +21,9 @@ from ballpass.runtime.contract.errors import RequestError
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class")
+
+#: Bytes of a name in a path, and of a path.
+_LONGEST, _LONGEST_PATH = 255, 4000
 
 _NAMES, _TEXT, _PATH, _MAPPING = "one name or several in a list", "a text", "a path", "a mapping from name to value"
 
@@ -74,7 +81,34 @@ def type_fault(name: str, annotation: str, value: Any) -> str | None:
     if expected is None or (value is None and optional != kind) or _fits(expected, optional, value):
         return None
     example = f" Example: {name}={_EXAMPLES[name]}." if name in _EXAMPLES else ""
-    return f"{name}: {expected} is expected, not {value!r:.60} ({type(value).__name__}).{example}"
+    if expected == _PATH and isinstance(value, str | os.PathLike):
+        example = f" Names in a path have up to {_LONGEST} bytes, none of them NUL.{example}"
+    elif expected == _NAMES and isinstance(value, set | frozenset):
+        example = f" A set has no order.{example}"
+    return f"{name}: {expected} is expected, not {brief(value)} ({type(value).__name__}).{example}"
+
+
+def brief(value: object) -> str:
+    """A value as Python writes it, shortened."""
+    value = os.fspath(value) if isinstance(value, os.PathLike) else value
+    try:
+        return f"{value!r:.60}"
+    except (ValueError, RecursionError):  # more digits, or lists in lists, than Python writes
+        return f"a {type(value).__name__} that cannot be written"
+
+
+def plain(annotation: str, value: Any) -> Any:
+    """A value as the code behind an annotation takes it."""
+    if type(value).__module__ == "numpy" and value.shape == ():
+        value = value.item()
+    value = _finite(value)
+    kind = _without_modules(annotation).removesuffix(" | None")
+    if _EXPECTED.get(kind) == _NAMES:
+        if isinstance(value, str):
+            return value if kind.startswith("str") else (value,)
+        if isinstance(value, Iterable) and not isinstance(value, bytes | set | frozenset):
+            return tuple(value)
+    return value
 
 
 def _without_modules(annotation: str) -> str:
@@ -83,14 +117,13 @@ def _without_modules(annotation: str) -> str:
 
 def _fits(expected: str, kind: str, value: Any) -> bool:
     if expected == _NAMES:
-        several = isinstance(value, Iterable) and not isinstance(value, bytes)
-        # an iterator is spent by looking into it
-        return several and (iter(value) is value or all(isinstance(item, str) for item in value))
+        several = isinstance(value, Iterable) and not isinstance(value, bytes | set | frozenset)
+        return several and all(isinstance(item, str) for item in value)
     if expected == _TEXT:
         return isinstance(value, str)
     if expected == _PATH:
         # an empty one would be the working directory
-        return isinstance(value, str | os.PathLike) and value != ""
+        return isinstance(value, str | os.PathLike) and value != "" and _is_file_name(os.fspath(value))
     if expected == _MAPPING:
         nested = kind.startswith("Mapping[str, Mapping")
         return isinstance(value, Mapping) and all(isinstance(item, Mapping) for item in value.values() if nested)
@@ -109,6 +142,26 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
     return any(base.__name__ == kind for base in type(value).__mro__)
 
 
+def _finite(value: Any, depth: int = 64) -> Any:
+    """A value that Python can write: integers beyond all floats are infinite, lists are in few others."""
+    if isinstance(value, int):
+        return value if abs(value) <= sys.float_info.max else math.inf if value > 0 else -math.inf
+    if type(value) in (list, tuple, dict) and not depth:
+        return ...
+    if type(value) is dict:
+        return {_finite(key): _finite(item, depth - 1) for key, item in value.items()}
+    return type(value)(_finite(item, depth - 1) for item in value) if type(value) in (list, tuple) else value
+
+
+def _is_file_name(path: str | bytes) -> bool:
+    """Whether a file system can have it: text that can be encoded, no NUL, names and the whole not too long."""
+    try:
+        name = os.fsencode(path)
+    except UnicodeEncodeError:
+        return False
+    return b"\0" not in name and len(name) <= _LONGEST_PATH and max(map(len, re.split(rb"[/\\]", name))) <= _LONGEST
+
+
 def is_number(value: object) -> bool:
     """Whether a value is one real number, also as NumPy has them."""
     if getattr(value, "shape", None) == ():
@@ -120,17 +173,19 @@ def typed(function: _Function) -> _Function:
     """The function that first refuses arguments of a wrong type with a `RequestError`, as a decorator."""
     written = {name: _without_modules(kind) for name, kind in function.__annotations__.items() if name != "return"}
     kinds = {name: kind for name, kind in written.items() if kind in _KINDS}
-    if not kinds:
-        return function
     arguments = inspect.signature(function)
 
     @functools.wraps(function)
     def checked(*given: Any, **named: Any) -> Any:
-        values = arguments.bind(*given, **named).arguments
+        bound = arguments.bind(*given, **named)
+        values = bound.arguments
+        for name, kind in written.items():
+            if name in values:
+                values[name] = plain(kind, values[name])
         faults = [type_fault(name, kind, values[name]) for name, kind in kinds.items() if name in values]
         if any(faults):
             raise RequestError("\n".join(filter(None, faults)))
-        return function(*given, **named)
+        return function(*bound.args, **bound.kwargs)
 
     return cast("_Function", checked)
 

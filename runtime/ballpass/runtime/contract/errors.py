@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 
 class BallpassError(Exception):
     """Base of every error raised on purpose: what, what was given, what is allowed, what to do."""
+
+    def __str__(self) -> str:
+        """The message, in which what was given is not longer than people read."""
+        return re.sub(r"\S{500,}", lambda word: f"{word[0][:200]}...", super().__str__())
 
 
 class RequestError(BallpassError, ValueError):

@@ -109,7 +109,13 @@ def replace_files(
     What `write` returned.
     """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise RequestError(
+            f"{folder}: this folder cannot be made ({fault.strerror}). Allowed: one that is there, or a place where "
+            "you may make one."
+        ) from fault
     try:
         with locked(folder):
             for left in folder.glob(f"{NEW}*"):  # by processes that were killed

@@ -12,9 +12,9 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
-from ballpass.runtime.contract.arguments import is_number, type_fault
+from ballpass.runtime.contract.arguments import brief, is_number, type_fault
 from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
@@ -78,11 +78,15 @@ class Option:
         wanted = type_fault(name, kind.__name__ if isinstance(kind, type) else str(kind), value)
         if wanted is not None:
             return wanted
-        if self.choices and value is not None:
-            several = isinstance(value, Iterable) and not isinstance(value, str | bytes)
-            wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in self.choices]
-            allowed, right = ", ".join(self.choices), not wrong
-            given = "" if right else f"{wrong[0]!r:.60} is none of the choices"
+        choices = self.choices or _literals(kind)
+        if choices and (value is not None or type(None) not in get_args(kind)):
+            several = is_of(kind, Sequence) and isinstance(value, Iterable) and not isinstance(value, str)
+            wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in choices]
+            allowed, right = ", ".join(choices), not wrong
+            given = "" if right else f"{brief(wrong[0])} is none of the choices"
+        elif is_of(kind, tuple) and value is not None:
+            right = isinstance(value, Sequence) and len(value) == 2 and all(is_number(one) for one in value)
+            allowed, given = f"two numbers [{self.unit}]", f"{brief(value)} was given"
         elif kind in (int, int | None) and isinstance(value, float):
             allowed, right = self._allowed("whole number"), False
             given = f"{value!r} is no whole number"
@@ -96,7 +100,7 @@ class Option:
             if value is None and kind not in (float, int):
                 return None
             allowed, right = self._allowed("number"), False
-            given = f"{value!r:.60} ({type(value).__name__}) is no number"
+            given = f"{brief(value)} ({type(value).__name__}) is no number"
         else:
             return None
         return None if right else f"{name}: {given}. Allowed: {allowed}."
@@ -170,6 +174,17 @@ def refuse_unknown(
         raise RequestError("\n".join(faults))
 
 
+def _literals(kind: Any) -> tuple[str, ...]:
+    """The words of a `Literal`, also of one that may be None."""
+    return tuple(
+        word
+        for one in (kind, *get_args(kind))
+        if get_origin(one) is Literal
+        for word in get_args(one)
+        if word is not None
+    )
+
+
 def is_of(kind: Any, container: type) -> bool:
     """Whether a type is, or may be, one of `Sequence`, `tuple`."""
     return any(get_origin(item) is container for item in (kind, *get_args(kind)))
@@ -219,6 +234,7 @@ SampleRate = Annotated[
         example='"25.6 kHz"',
         shown="RATE",
         unit="Hz",
+        above=0.0,
     ),
 ]
 

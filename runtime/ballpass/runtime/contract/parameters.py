@@ -11,6 +11,7 @@ from numbers import Real
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import brief
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest, ParameterInfo
@@ -231,14 +232,16 @@ def vector(value: object) -> np.ndarray:
 def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
     """Message for an unknown name: the nearest ones, or all where they are few."""
     names = list(known)
-    name = name if not isinstance(name, str) or len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
-    near = difflib.get_close_matches(str(name), names, n=4, cutoff=0.5)
+    text = name if isinstance(name, str) else brief(name)
+    text = text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
+    said = repr(text) if isinstance(name, str) else text
+    near = difflib.get_close_matches(text, names, n=4, cutoff=0.5)
     if not near:
         # only the last part of the path given: the commonest slip that the ratio of difflib misses
-        tail = str(name).rsplit(".", 1)[-1]
+        tail = text.rsplit(".", 1)[-1]
         near = [candidate for candidate in names if tail and tail in candidate][:4]
     if near:
-        return f"There is no {what} {name!r}. Did you mean {' or '.join(map(repr, near))}?"
+        return f"There is no {what} {said}. Did you mean {' or '.join(map(repr, near))}?"
     if len(names) <= 12:
-        return f"There is no {what} {name!r}. There are: {', '.join(names) or 'none'}."
-    return f"There is no {what} {name!r}. There are {len(names)}; the first: {', '.join(names[:8])}, ..."
+        return f"There is no {what} {said}. There are: {', '.join(names) or 'none'}."
+    return f"There is no {what} {said}. There are {len(names)}; the first: {', '.join(names[:8])}, ..."

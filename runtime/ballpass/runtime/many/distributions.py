@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.contract.arguments import typed_methods
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import unknown_name
@@ -23,6 +24,7 @@ PARAMETERS, NOISE = 0, 1
 ENDS = ("loguniform", "reciprocal")
 
 
+@typed_methods
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distribution:
     """A continuous distribution of `scipy.stats`.

@@ -165,6 +165,7 @@ class CompiledFunctions:
     def virtual_integrator(self, intervals: int) -> casadi.Function:
         """CasADi's integrator over a grid, in the virtual machine (see `casadi_integrators`)."""
         refuse_faults({"intervals": (int, _INTERVALS)}, {"intervals": intervals})
+        intervals = int(intervals)
         with self._making:
             if intervals not in self._integrators:
                 manifest = self.manifest

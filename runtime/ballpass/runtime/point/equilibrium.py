@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import Numbers, real, vector
+from ballpass.runtime.contract.parameters import Numbers, real, unknown_name, vector
 from ballpass.runtime.contract.refused_scenes import refuse_without_bearings
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
@@ -154,9 +154,7 @@ class StaticEquilibrium(Reported):
         '132.2 um'
         """
         if name not in self.coordinates:
-            raise RequestError(
-                f"There is no position {name!r} in this equilibrium. There are: {', '.join(self.coordinates)}."
-            )
+            raise RequestError(unknown_name("position of this equilibrium", name, self.coordinates))
         return float(self.positions[self.coordinates.index(name)])
 
     @property

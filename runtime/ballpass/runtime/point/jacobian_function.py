@@ -14,6 +14,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.arguments import brief, typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
@@ -150,6 +151,7 @@ class JacobianFunction:
                 continue
             memory[:] = values[name] if name in ARGUMENTS else directions.of(name[1:]).reshape(-1, order="F")
 
+    @typed
     def move(self, t: float, parameters: dict[str, float] | None = None) -> None:
         """Go to another time [s] and other parameters; the state stays.
 
@@ -172,7 +174,10 @@ class JacobianFunction:
         >>> J(model.initial()).shape == J.sparsity.rows.shape
         True
         """
-        self.x[:] = x
+        try:
+            self.x[:] = x
+        except (TypeError, ValueError, OverflowError):
+            raise RequestError(f"x: {len(self.x)} numbers are expected, not {brief(x)} ({type(x).__name__}).") from None
         self.evaluate()  # straight-line code: it has no failure to report
         if self._result is not None:
             # mode: the indices are right, and checking them would need a buffer

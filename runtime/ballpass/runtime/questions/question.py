@@ -13,7 +13,7 @@ from functools import wraps
 from inspect import Parameter, cleandoc, signature
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
-from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.arguments import plain, typed
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
@@ -84,13 +84,15 @@ class Question:
         def checked(*given: Any, **named: Any) -> Any:
             values = signature(ask).bind(*given, **named)
             values.apply_defaults()
+            for name, (kind, _) in options_of(ask).items():
+                values.arguments[name] = plain(str(kind), values.arguments[name])
             refuse_faults(options_of(ask), values.arguments)
             self.refuse(values.arguments)
             refuse_unknown(options_of(ask), values.arguments)  # first, as the command line must
             manifest = next(iter(values.arguments.values())).manifest
             question.refuse_scene(integrated=manifest.integrated, bearings=bool(manifest.bearings))
             refuse_unknown(options_of(ask), values.arguments, manifest)
-            return call(*given, **named)
+            return call(*values.args, **values.kwargs)
 
         checked.__doc__ = _with_options(ask)
         _DECLARED[checked] = question

@@ -56,6 +56,7 @@ SampleRate = Annotated[
         example='"25.6 kHz"',
         shown="RATE",
         unit="Hz",
+        above=0.0,
     ),
 ]
 Of = Annotated[

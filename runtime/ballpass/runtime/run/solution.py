@@ -17,6 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
+from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.ratings.of_bearing import bearing_words
@@ -139,6 +140,9 @@ class Solution:
             object.__setattr__(self, name, dict(getattr(self, name)))
 
     def __getitem__(self, name: str) -> np.ndarray:
+        known = tuple(dict.fromkeys((*self.outputs, *self.states)))
+        if not isinstance(name, str):
+            raise RequestError(unknown_name("output or state", name, known))
         if name in self.outputs:
             return self.outputs[name]
         names = self.states
@@ -148,7 +152,6 @@ class Solution:
             raise RequestError(
                 f"{name!r} was not kept in this run: name it in simulate(outputs=...), or omit outputs to keep all."
             )
-        known = tuple(dict.fromkeys((*self.outputs, *names)))
         raise RequestError(no_output(self.manifest, name, known, "output or state"))
 
     def __contains__(self, name: object) -> bool:
