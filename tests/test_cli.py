@@ -356,7 +356,7 @@ def test_folder_without_permission_is_refused(ballpass: Callable[..., Result], t
 def test_folder_that_cannot_be_made_is_refused_by_derive(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     result = ballpass(tmp_path, "derive", SCENES / "varying_compliance.toml", "--out", tmp_path / "file" / "generated")
-    says_no(result, "file", "Check the path")
+    says_no(result, "file", "this folder cannot be made (Not a directory)")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 

@@ -36,6 +36,8 @@ from ballpass.runtime.app.commands.trade import trade
 from ballpass.runtime.contract.arguments import type_fault
 from ballpass.runtime.contract.options import options_of
 from ballpass.runtime.questions import QUESTIONS
+from ballpass.runtime.report.report import Marked, Report, ReportTable
+from ballpass.runtime.report.text import to_text
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
@@ -52,7 +54,7 @@ PRESS_FILE = str(SCENES / "punching_press.toml")
 @pytest.mark.parametrize(
     "value",
     [
-        *(5, math.inf, None, [], {}, (), {5: 5}, {"x": 1}, b"x", 1j, object(), np.array([]), type, [[1]]),
+        *(5, math.inf, None, [], {}, (), {5: 5}, {"x": 1}, b"x", 1j, object(), np.array([]), type, [[1]], np.sin),
         *(
             10**5000,
             [10**5000],
@@ -440,6 +442,32 @@ def test_a_wrong_setting_exits_with_2_and_leaves_nothing(
     for word in words:
         assert word in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+OBEYED = "\x1b[2J\x1b]0;owned\x07\r\u202e\x9b31m"
+
+
+def test_nothing_that_a_terminal_obeys_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Heads of a file of measurements, names of files and titles of solutions went to the terminal as they are."""
+    monkeypatch.chdir(tmp_path)
+    data = tmp_path / "data.csv"
+    data.write_text(f"time,{OBEYED}\n0,1\n1,2\n", encoding="utf-8", newline="")
+    named = tmp_path / f"{OBEYED}.toml"
+    named.write_text(ROTOR.replace("balls = 8", "balls = x"), encoding="utf-8")
+    for words in (
+        ["fit", PRESS_FILE, str(data), "--vary", "bearing.clearance=1um:3um"],
+        ["run", str(named)],
+        ["run", str(tmp_path / f"{OBEYED}")],
+        ["run", PRESS_FILE, "--of", f"max:{OBEYED}"],
+    ):
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 2
+        assert not set(OBEYED).difference("[2J]0;owned31m") & set(done.output), words
+        assert r"\x1b[2J" in done.output or words[0] == "fit", done.output
+    table = ReportTable(heads=("a", OBEYED), rows=[(OBEYED, Marked(OBEYED, "bad"))], title=OBEYED, caption=OBEYED)
+    text = to_text(Report(title=OBEYED, parts=(OBEYED, table)))
+    assert text.count(r"\x1b[2J\x1b]0;owned\x07\r\u202e\x9b31m") == 7
+    assert all(letter.isprintable() or letter == "\n" for letter in text)
 
 
 @pytest.mark.parametrize("evil", [evil for evil in EVIL if "\0" not in evil and "/" not in evil and len(evil) < 200])

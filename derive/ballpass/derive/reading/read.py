@@ -103,8 +103,6 @@ def read_scene(
         raise _unreadable(
             file, error.strerror or type(error).__name__, f"give the path of a scene file (TOML){_copy_of(file)}"
         ) from None
-    except ValueError:  # a NUL in the path
-        raise _unreadable(file, "this is not a path", "give the path of a scene file (TOML)") from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

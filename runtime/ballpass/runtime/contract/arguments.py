@@ -99,7 +99,7 @@ def brief(value: object) -> str:
 
 def plain(annotation: str, value: Any) -> Any:
     """A value as the code behind an annotation takes it."""
-    if type(value).__module__ == "numpy" and value.shape == ():
+    if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
         value = value.item()
     value = _finite(value)
     kind = _without_modules(annotation).removesuffix(" | None")

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import re
 
+#: What a terminal obeys, or what turns the order of text round, apart from ends of lines and tabs.
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """Text for a terminal: control characters, as names in files may hold, are written as Python writes them."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
+
 
 class BallpassError(Exception):
     """Base of every error raised on purpose: what, what was given, what is allowed, what to do."""
 
     def __str__(self) -> str:
-        """The message, in which what was given is not longer than people read."""
-        return re.sub(r"\S{500,}", lambda word: f"{word[0][:200]}...", super().__str__())
+        """The message, in which what was given is not longer than people read, and nothing that a terminal obeys."""
+        return printable(re.sub(r"\S{500,}", lambda word: f"{word[0][:200]}...", super().__str__()))
 
 
 class RequestError(BallpassError, ValueError):

@@ -15,6 +15,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ballpass.runtime.contract.errors import printable
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 
 #: Columns of text without a terminal.
@@ -50,7 +51,7 @@ def table_text(table: ReportTable, width: int = WIDTH) -> str:
 
 def _print(report: Report, console: Console) -> None:
     if report.title:
-        console.print(Text(report.title, style="bold"), highlight=False)
+        console.print(_plain(report.title, "bold"), highlight=False)
     for part in report.parts:
         if isinstance(part, ReportTable):
             _print_table(part, console)
@@ -63,14 +64,14 @@ def _print(report: Report, console: Console) -> None:
 def _print_table(table: ReportTable, console: Console) -> None:
     width = console.width
     if table.title:
-        console.print(Text(table.title, style="italic"), highlight=False)
+        console.print(_plain(table.title, "italic"), highlight=False)
     for block in _blocks(table, console):
         # wider only where a block cannot be narrower
         console.width = max(width, _least_width(block))
         console.print(block, highlight=False)
         console.width = width
     if table.caption:
-        console.print(Text(table.caption, style="dim italic"), highlight=False)
+        console.print(_plain(table.caption, "dim italic"), highlight=False)
 
 
 def _blocks(table: ReportTable, console: Console) -> Iterator[Table]:
@@ -95,8 +96,8 @@ def _of_columns(table: ReportTable, columns: Sequence[int]) -> Table:
         justify: JustifyMethod = "right" if head in table.right else "left"
         whole = head not in table.wrapped
         # a column that must not wrap would be cut where the table has no room
-        least = max(_WIDE.measure(cell).maximum for cell in (Text(head), *(row[place] for row in cells)))
-        part.add_column(Text(head), justify=justify, no_wrap=whole, min_width=least if whole else None)
+        least = max(_WIDE.measure(cell).maximum for cell in (_plain(head), *(row[place] for row in cells)))
+        part.add_column(_plain(head), justify=justify, no_wrap=whole, min_width=least if whole else None)
     for number, row in enumerate(cells):
         part.add_row(*row, end_section=number + 1 in table.sections)
     return part
@@ -104,8 +105,12 @@ def _of_columns(table: ReportTable, columns: Sequence[int]) -> Table:
 
 def _text(words: Words) -> Text:
     if isinstance(words, Marked):
-        return Text.assemble((words.text, _STYLES[words.look]), words.rest)
-    return Text(words)
+        return _plain(words.text, _STYLES[words.look]).append_text(_plain(words.rest))
+    return _plain(words)
+
+
+def _plain(text: str, style: str = "") -> Text:
+    return Text(printable(text), style=style)
 
 
 def _least_width(table: Table) -> int:

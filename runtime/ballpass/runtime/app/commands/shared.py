@@ -25,7 +25,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ballpass.runtime.app.interrupted import say_interrupted
-from ballpass.runtime.contract.errors import BallpassError, RequestError
+from ballpass.runtime.contract.errors import BallpassError, RequestError, printable
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.report.plain import json_text
@@ -128,27 +128,28 @@ def warn_of_scene(manifest: Manifest) -> None:
 
 def complain(message: str) -> None:
     """Print an error on stderr."""
-    _say(f"[bold red]error[/]: {escape(message)}")
+    _say("[bold red]error[/]", message)
 
 
 def warn(message: Warning | str) -> None:
     """Print a warning on stderr."""
-    _say(f"[bold yellow]warning[/]: {escape(str(message))}")
+    _say("[bold yellow]warning[/]", str(message))
 
 
 def note(message: str) -> None:
     """Print a remark on stderr."""
-    _say(f"[bold]note[/]: {escape(message)}")
+    _say("[bold]note[/]", message)
 
 
-def _say(marked: str) -> None:
+def _say(kind: str, message: str) -> None:
     """Print on stderr: on a terminal in lines broken between words, elsewhere a sentence is a line."""
+    marked = f"{kind}: {escape(printable(message))}"
     errors_console.print(marked, soft_wrap=not errors_console.is_terminal, highlight=False)
 
 
 def show(text: str) -> None:
     """Print a line of results on stdout."""
-    Console(emoji=False).print(text, highlight=False, soft_wrap=True, markup=False)
+    Console(emoji=False).print(printable(text), highlight=False, soft_wrap=True, markup=False)
 
 
 def show_files(folder: Path, files: Sequence[str], more: str = "") -> None:
