@@ -7,6 +7,7 @@ import json
 import math
 import re
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,7 +32,7 @@ from ballpass.derive.scene.keys import (
     WholeKey,
 )
 from ballpass.derive.scene.quantity import Bounds
-from ballpass.derive.scene.table import Collector, Table
+from ballpass.derive.scene.table import MISSPELT, Collector, Table
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.derive.scene.units import COMMON, KINDS
 
@@ -173,6 +174,21 @@ def test_schema_refuses_usual_units_of_another_dimension_and_signs_as_the_reader
             assert fits or table.collector.faults, given
             if name != "furlong" and (sign or name.isascii()):
                 assert not (fits and table.collector.faults), given
+
+
+def test_no_key_is_taken_for_another_one_that_is_misspelt() -> None:
+    """Those that are as like each other as misspelt ones become known together, so that none is unknown when read."""
+    tables: dict[tuple[str, ...], set[str]] = {}
+    for section in sections():
+        tables.setdefault(section.path, set()).update(section.keys)
+    like = {
+        (*path, one): other
+        for path, keys in tables.items()
+        for one in keys
+        for other in get_close_matches(one, sorted(keys - {one}), n=1, cutoff=MISSPELT)
+    }
+    together = {"fit", "contact", "equivalent_mass", "initial"}
+    assert {path[-2] for path in like} == together, like
 
 
 def test_schema_requires_the_law_that_decides_about_other_keys() -> None:

@@ -85,10 +85,9 @@ def read_count(table: Table, coupling: str) -> SceneNumber | None:
 
 def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:
     """The body that carries the inner ring: at the frame the other one, where it is not named."""
-    joint = next((j for j in mechanism.joints if j.name == name), None) if mechanism is not None else None
-    if mechanism is not None and joint is not None:
-        names = (FRAME, *(body.name for body in mechanism.bodies))
-        joint = joint if all(body in names for body in joint.bodies) else None
+    joints = mechanism.joints if mechanism is not None else ()
+    bodies = {FRAME, *(body.name for body in mechanism.bodies)} if mechanism is not None else set()
+    joint = next((j for j in joints if j.name == name and bodies.issuperset(j.bodies)), None)
     with table.table("inner_ring", "body", required=False) as ring:
         ring.know("body")
         ring.refuse(
@@ -98,9 +97,8 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
             remedy="delete the key",
         )
         moving = [body for body in joint.bodies if body != FRAME] if joint is not None else []
-        if (
-            joint is None or not moving or (ring.missing and "inner_ring" in table.data)
-        ):  # what is wrong with its bodies was said where it was read
+        no_table = ring.missing and "inner_ring" in table.data
+        if joint is None or not moving or no_table:  # what is wrong was said where it was read
             return str(BODY.read(ring, "body")) if ring.has("body") else ""
         if not ring.has("body"):
             if len(moving) == 1:
