@@ -235,7 +235,7 @@ def test_a_chaotic_motion_is_refused(press: Model) -> None:
         ({"time": np.arange(9.0), "outer.z": np.arange(9.0)}, {}, "none of its columns"),
         ({"time": np.zeros(9), "outer.y": np.arange(9.0)}, {}, "do not increase"),
         ({"time": np.arange(9.0), "outer.y": np.ones(9)}, {}, "not constant"),
-        ({"outer.y": np.arange(9.0)}, {}, "no time"),
+        ({"outer.y": np.arange(9.0)}, {}, "no column of times"),
         ({"time": np.arange(9.0) - 1.0, "outer.y": np.arange(9.0)}, {}, "starts at 0 s"),
         ({"time": np.arange(9.0), "outer.y": np.arange(9.0), CLEARANCE: 1e-5}, {}, "are to be found"),
         ({"time": np.arange(9.0), "a": np.arange(9.0)}, {"signal": "ball.force=a"}, "one value"),

@@ -177,12 +177,13 @@ def _scene(
             remedy="copy one of the files in scenes/ and change it",
         )
         raise SceneError(collector.faults, source=source)
-    data = with_columns(data, None if source is None else Path(source).parent, collector.faults)
+    notes: list[str] = []
+    data = with_columns(data, None if source is None else Path(source).parent, collector.faults, notes)
     scene = _read(Table(collector, (), data), name)
     faults = [*collector.faults, *value_faults(scene, collector.given)]
     faults = faults or duty_faults(scene)
     if not faults:
-        return replace(scene, lines=collector.lines)
+        return replace(scene, lines=collector.lines, notes=tuple(notes))
     topology, none = ("mechanism.joints", "mechanism.driver"), ("mechanism", "mechanism.bodies")
     places = [fault.key for fault in collector.faults]
     if scene.mechanism is not None and not any(key.startswith(topology) or key in none for key in places):

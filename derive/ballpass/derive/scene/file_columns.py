@@ -1,25 +1,26 @@
 """Columns of numbers that a scene takes from a CSV or NetCDF file: measured forces and loads.
 
 In: the parsed TOML of a scene file and its folder.  Out: the same with ``{ file = "punch.csv", column = "force",
-unit = "N" }`` in the form of a written column, ``{ values = [...], unit = "N" }``.
+unit = "N" }`` in the form of a written column, ``{ values = [...], unit = "N" }``.  The unit of the file is taken where
+the scene gives none.  `ballpass.runtime.contract.columns` reads the files.
 
-The first line of a CSV file names its columns; lines that begin with ``#`` are left out.  A column of a NetCDF file,
-whose name ends in ``.nc``, is a variable of one dimension; its attribute ``units`` is taken where the scene gives no
-unit.
+Each row of a table is a parameter of the model, with a derivative of its own.  A table of more than `MOST_ROWS` rows is
+thinned: the rows that are kept are those that the straight lines between the others miss most.
 """
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterator, Sequence
+import heapq
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
+
+import numpy as np
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.runtime.contract.folders import read_file, refuse_other
-
-#: Bytes of a file of columns at most.
-LARGEST = 100_000_000
+from ballpass.runtime.contract.columns import ColumnError, read_columns
+from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 
 #: Most rows: each is a parameter of the model, with a derivative of its own.
 MOST_ROWS = 1000
@@ -34,99 +35,98 @@ def named_files(data: object) -> Iterator[str]:
             yield from named_files(value)
 
 
-def with_columns(data: dict[str, Any], folder: Path | None, faults: list[Fault], path: str = "") -> dict[str, Any]:
-    """The scene's tables with the columns of files in place of their names; faults are noted.
+def with_columns(
+    data: dict[str, Any], folder: Path | None, faults: list[Fault], notes: list[str], path: str = ""
+) -> dict[str, Any]:
+    """The scene's tables with the columns of files in place of their names; faults and notes are added.
+
+    A column that cannot be read has None in place of its values, and nothing more is reported of it.
 
     Parameters
     ----------
     folder : of the scene file; None for a scene that is only text
     path : dotted place of `data`
     """
-    if isinstance(data.get("file"), str) and isinstance(data.get("column"), str):
-        return _column(data, folder, faults, path)
-    return {
-        key: with_columns(value, folder, faults, f"{path}.{key}" if path else key) if isinstance(value, dict) else value
-        for key, value in data.items()
-    }
+    found, read = {}, {}
+    for key, value in data.items():
+        place = f"{path}.{key}" if path else key
+        if isinstance(value, dict) and isinstance(value.get("file"), str) and isinstance(value.get("column"), str):
+            found[key] = read[key] = _column(value, folder, faults, notes, place)
+        else:
+            found[key] = with_columns(value, folder, faults, notes, place) if isinstance(value, dict) else value
+    _thin(path, read, notes)
+    return found
 
 
-class _Unfit(Exception):
-    """A fault of a column, as the parts of a `Fault`."""
-
-
-def _refuse(problem: str, given: object, allowed: str, remedy: str) -> NoReturn:
-    raise _Unfit(problem, repr(given), allowed, remedy)
-
-
-def _column(data: dict[str, Any], folder: Path | None, faults: list[Fault], path: str) -> dict[str, Any]:
+def _column(
+    data: dict[str, Any], folder: Path | None, faults: list[Fault], notes: list[str], path: str
+) -> dict[str, Any]:
     rest = {key: value for key, value in data.items() if key not in ("file", "column")}
     name, wanted = data["file"], data["column"]
     try:
         if folder is None:
-            text = "a path counts from the folder of the scene file, and this scene has none"
-            _refuse(text, name, "columns written as lists", "read the scene from a file, or write the numbers down")
-        if not name.endswith(".nc"):
-            return {**rest, "values": _of_csv(folder / name, name, wanted)}
-        values, unit = _of_netcdf(folder / name, name, wanted)
-        return {"unit": unit, **rest, "values": values} if unit else {**rest, "values": values}
-    except _Unfit as unfit:
-        problem, given, allowed, remedy = unfit.args
-        faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
-        return {**rest, "values": [0.0, 0.0]}
-
-
-def _few(name: str, rows: int) -> None:
-    if rows > MOST_ROWS:
-        remedy = "thin it out: a table is linear between"
-        _refuse(f"{name} has too many rows", rows, f"at most {MOST_ROWS}", remedy)
-
-
-def _named(name: str, wanted: str, known: Sequence[str]) -> None:
-    if wanted not in known:
-        _refuse(f"{name} has no such column", wanted, ", ".join(known) or "none: it is empty", "name one of them")
-
-
-def _of_csv(file: Path, name: str, wanted: str) -> list[float]:
-    try:
-        text = read_file(file, LARGEST).decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "it is not text in UTF-8"
-        _refuse(f"the file cannot be read: {why}", name, "a CSV file", "give its path from the scene file's folder")
-    lines = [
-        (k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
-    ]
-    rows = list(csv.reader((line for _, line in lines), skipinitialspace=True))
-    heads = [head.strip() for head in rows[0]] if rows else []
-    _named(name, wanted, heads)
-    _few(name, len(rows) - 1)
-    place, values = heads.index(wanted), []
-    for (line, _), row in zip(lines[1:], rows[1:], strict=True):
-        try:
-            values.append(float(row[place]))
-        except (ValueError, IndexError):
-            given = row[place] if place < len(row) else "nothing"
-            _refuse(f"line {line} of {name} has no number there", given, "numbers without a unit", "correct the line")
-    return values
-
-
-def _of_netcdf(file: Path, name: str, wanted: str) -> tuple[list[float], str]:
-    """Numbers, and their unit; "" where the file has none."""
-    import h5netcdf  # importing it takes longer than reading most scenes
-
-    try:
-        refuse_other(file)
-        stored = h5netcdf.File(file, "r")
-    except (OSError, ValueError) as error:
-        why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"
-        _refuse(
-            f"the file cannot be read: {why}", name, "a NetCDF-4 file", "give its path from the scene file's folder"
+            raise ColumnError(
+                "a path counts from the folder of the scene file, and this scene has none",
+                repr(name),
+                "columns written as lists",
+                "read the scene from a file, or write the numbers down",
+            )
+        file = read_columns(folder / name, name)
+        column = file.in_unit(file.column(wanted), str(rest.get("unit", "")))
+        numbers = file.numbers(column)
+        for missing in np.flatnonzero(~np.isfinite(numbers))[:1]:
+            where = f"line {file.lines[missing]}" if file.lines else f"row {missing + 1}"
+            raise ColumnError(
+                f"{where} of {name} has no number there",
+                repr(wanted),
+                "a finite number in each row",
+                "correct the file",
+            )
+    except ColumnError as fault:
+        faults.append(
+            Fault(key=path, problem=fault.problem, given=fault.given, allowed=fault.allowed, remedy=fault.remedy)
         )
-    with stored:
-        _named(name, wanted, list(stored.variables))
-        variable = stored.variables[wanted]
-        if variable.ndim != 1 or variable.dtype.kind not in "fiu":
-            given = f"{variable.ndim} dimensions of {variable.dtype}"
-            _refuse(f"{wanted} of {name} is no column", given, "numbers along one dimension", "name another variable")
-        _few(name, variable.shape[0])
-        unit = variable.attrs.get("units", "")
-        return [float(value) for value in variable[...]], unit if isinstance(unit, str) else ""
+        return {"unit": "1", **rest, "values": None}
+    if file.layout and (note := f"{name}: {file.layout}") not in notes:
+        notes.append(note)
+    unit = {"unit": column.unit} if column.unit else {}
+    return {**unit, **rest, "values": numbers.tolist()}
+
+
+def _thin(path: str, columns: dict[str, dict[str, Any]], notes: list[str]) -> None:
+    """Keep `MOST_ROWS` rows of a longer table: each next one is that which the lines between the others miss most."""
+    over = next((key for key in columns if key in ("time", "angle")), "")
+    lengths = {len(column["values"] or ()) for column in columns.values()}
+    if not over or len(lengths) > 1 or max(lengths) <= MOST_ROWS:
+        return
+    x = np.array(columns[over]["values"])
+    others = {key: np.array(column["values"]) for key, column in columns.items() if key != over}
+    if np.any(np.diff(x) <= 0.0):  # reported when the table is read
+        return
+    scaled = np.array([values / (np.ptp(values) or 1.0) for values in others.values()]).reshape(len(others), len(x))
+    kept, waiting = {0, len(x) - 1}, [_missed(x, scaled, 0, len(x) - 1)]
+    while len(kept) < MOST_ROWS:
+        _, row, first, last = heapq.heappop(waiting)
+        kept.add(row)
+        for ends in ((first, row), (row, last)):
+            heapq.heappush(waiting, _missed(x, scaled, *ends))
+    rows = sorted(kept)
+    off = [
+        f"{key} by {np.max(np.abs(np.interp(x, x[rows], values[rows]) - values)):.3g} {columns[key].get('unit', '')}"
+        for key, values in others.items()
+    ]
+    for column in columns.values():
+        column["values"] = [column["values"][row] for row in rows]
+    held = f"{len(x)} rows of a file are held as {len(rows)}, linear between"
+    note = f"{path}: {held}; this changes {', '.join(off)} at most"
+    notes.append(note)
+    warnings.warn(f"{note}.", UnusualWarning, stacklevel=2)
+
+
+def _missed(x: np.ndarray, scaled: np.ndarray, first: int, last: int) -> tuple[float, int, int, int]:
+    """The row between two that the line between them misses most; first how much, negative."""
+    share = (x[first : last + 1] - x[first]) / (x[last] - x[first])
+    line = scaled[:, [first]] + share * (scaled[:, [last]] - scaled[:, [first]])
+    off = np.max(np.abs(scaled[:, first : last + 1] - line), axis=0, initial=0.0)
+    row = int(np.argmax(off)) if last - first > 1 else 0
+    return (-float(off[row]) if last - first > 1 else 1.0), first + row, first, last

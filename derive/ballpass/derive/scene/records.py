@@ -480,7 +480,7 @@ class Scene:
     """A checked scene.
 
     `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `duty` is for lives alone.  `lines`
-    are the lines of its keys, for messages.
+    are the lines of its keys, for messages; `notes` say how files of columns were read.
 
     Examples
     --------
@@ -507,6 +507,7 @@ class Scene:
     run: RunSettings
     duty: tuple[DutyState, ...] = ()
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
+    notes: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     def __repr__(self) -> str:
         bodies = [body.name for body in self.mechanism.bodies] if self.mechanism is not None else []

@@ -158,6 +158,7 @@ class FitAnswer(ShortRepr, Reported):
     rivals : values of the parameters of other searches that fit as well within the noise
     loss, profile, rtol : as asked for
     converged : whether the best search ended by itself
+    notes : how the files were read
 
     Examples
     --------
@@ -180,6 +181,7 @@ class FitAnswer(ShortRepr, Reported):
     profile: bool
     rtol: float
     converged: bool
+    notes: tuple[str, ...] = ()
 
     def _report(self) -> Report:
         samples = sum(len(one.t) for one in self.signals)
@@ -191,7 +193,7 @@ class FitAnswer(ShortRepr, Reported):
             wrapped=("number",),
             caption="intervals by profiles of the misfit" if self.profile else "",
         )
-        said = []
+        said = list(self.notes)
         for one in self.undetermined:
             said.append(one.words)
             if one.combination:

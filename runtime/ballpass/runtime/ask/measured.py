@@ -2,32 +2,35 @@
 
 In: a path or a mapping, a manifest, names of columns by output.  Out: a `Trial`, SI.
 
-A CSV file's first line names its columns, with a unit in brackets where it is not SI: ``time [ms],outer.y [um]``.  The
-first column is the time.  Where it is ``frequency [Hz]`` the others are amplitudes of outputs.  Where it is
-``quantity``, rows name quantities: ``quantity,value,deviation`` with units in the cells.  A line ``# PATH = VALUE``
-says a number of the scene in this trial alone; other lines that begin with ``#`` are left out.  A NetCDF file has a
-variable ``time`` or ``frequency``, units in attributes, and numbers of the trial in attributes of its own.
+`ballpass.runtime.contract.columns` reads the files.  A column ``frequency`` in place of a time makes the others
+amplitudes of outputs.  Where the first column is ``quantity``, rows name quantities: ``quantity,value,deviation`` with
+units in the cells.  A line ``# PATH = VALUE``, in NetCDF an attribute, says a number of the scene in this trial alone.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.contract.columns import (
+    SAMPLE,
+    SEPARATORS,
+    Column,
+    ColumnFile,
+    assigned,
+    read_columns,
+    rows_of,
+    text_lines,
+)
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folders import read_file, refuse_other
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.parameters import said_unit, unknown_name, wrong_unit
-from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.contract.units import QuantityError, parse_quantity, show
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
-
-#: Largest CSV file [bytes].
-LARGEST = 500_000_000
 
 #: Fewest samples of a signal; most lines of a spectrum.
 FEWEST, MOST_LINES = 8, 2000
@@ -47,6 +50,7 @@ class Trial:
     signals : by output, NaN for what is missing, each of shape (samples,) [output's unit]
     parameters : numbers of the scene in this trial alone, SI
     quantities : what was measured instead of signals
+    notes : how the file was read, in words
     """
 
     name: str
@@ -54,6 +58,7 @@ class Trial:
     signals: Mapping[str, np.ndarray]
     parameters: Mapping[str, float]
     quantities: tuple[MeasuredQuantities, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,7 +83,14 @@ class MeasuredQuantities:
     sizes: np.ndarray
 
 
-def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], number: int) -> Trial:
+def read_trial(
+    manifest: Manifest,
+    source: Source,
+    columns: Mapping[str, str],
+    number: int,
+    time: str | None = None,
+    rate: float | None = None,
+) -> Trial:
     """Read the signals of a trial.
 
     Parameters
@@ -86,6 +98,7 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
     source : path of a file, or a mapping with ``time``, columns by name, and numbers of the scene by name, all SI
     columns : column by output; where there is none, all columns that are named as outputs are taken
     number : of the trial, from 1 on, as the name of a mapping
+    time, rate : see `ColumnFile.time`
 
     Raises
     ------
@@ -93,19 +106,21 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
         No such file or column, another format, times that do not increase, or too few samples.
     """
     infos = {info.name: info for info in manifest.parameters}
+    rows: Sequence[Sequence[str]] = ()
     if isinstance(source, str | Path):
-        name = Path(source).name
-        table, said = _netcdf(source) if name.endswith(".nc") else _csv(source)
-        numbers = {
-            key: _quantity(f"{name}, {key}", text, infos[key].unit) for key, text in said.items() if key in infos
-        }
+        path = Path(source)
+        name = path.name
+        rows, said = _rows_of_quantities(path)
+        file = ColumnFile(name=name, columns=(), said=said) if rows else read_columns(path)
+        numbers, notes = said_numbers(manifest, name, file.said)
+        notes = [f"{name}: {file.layout}", *notes] if file.layout else notes
     elif not hasattr(source, "keys"):
         raise RequestError(
             f"data: a file (CSV, NetCDF) or a mapping with time and columns is expected, not {source!r:.60} "
             f"({type(source).__name__})."
         )
     else:
-        name = f"trial {number}"
+        name, notes = f"trial {number}", []
         numbers = {key: float(_floats(name, key, source[key], ())) for key in source if key in infos}
         for key, info in infos.items():
             if key in source and (wrong := wrong_unit(source[key], info.unit)):
@@ -117,12 +132,39 @@ def read_trial(manifest: Manifest, source: Source, columns: Mapping[str, str], n
             rows = [
                 (key, *(f"{number!r} {units[key]}".rstrip() for number in pair.tolist())) for key, pair in pairs.items()
             ]
-            table = {"quantity": (rows, "")}
-    if "quantity" in table:
-        given = (_quantities(manifest, name, table["quantity"][0]),)
-        return Trial(name=name, t=np.zeros(0), signals={}, parameters=numbers, quantities=given)
-    arrays = {key: (_floats(name, key, values), unit) for key, (values, unit) in table.items()}
-    return _trial(manifest, name, arrays, columns, numbers)
+        else:
+            made = [
+                Column(head=key, name=key, unit=unit, stated=True, cells=_floats(name, key, values))
+                for key, (values, unit) in table.items()
+            ]
+            file = ColumnFile(name=name, columns=tuple(made))
+    if rows:
+        given = (_quantities(manifest, name, rows),)
+        return Trial(name=name, t=np.zeros(0), signals={}, parameters=numbers, quantities=given, notes=tuple(notes))
+    return replace(_trial(manifest, file, columns, numbers, time, rate), notes=tuple(notes))
+
+
+def said_numbers(manifest: Manifest, name: str, said: Mapping[str, str]) -> tuple[dict[str, float], list[str]]:
+    """Numbers of the scene that a file says [SI], and words on what it says of others.
+
+    Parameters
+    ----------
+    name : of the file
+    said : values by path, as texts
+
+    Raises
+    ------
+    RequestError
+        A value of another unit, or a path of the scene that is misspelt.
+    """
+    units = {info.name: info.unit for info in manifest.parameters}
+    tables, notes = {path.partition(".")[0] for path in units}, []
+    for path in said:
+        if path not in units and "." in path and path.partition(".")[0] in tables:
+            raise RequestError(f"{name}: {unknown_name('parameter', path, units)} Correct it, or leave the line out.")
+        if path not in units:
+            notes.append(f"{name}: the comment {show(path, 40)} is no number of the scene and was left out")
+    return {path: _quantity(f"{name}, {path}", said[path], units[path]) for path in said if path in units}, notes
 
 
 def _floats(name: str, key: str, value: Any, shape: tuple[int, ...] | None = None) -> np.ndarray:
@@ -180,26 +222,24 @@ def measurable(manifest: Manifest, wanted: Iterable[str]) -> dict[str, VariableI
 
 def _trial(
     manifest: Manifest,
-    name: str,
-    table: Mapping[str, tuple[np.ndarray, str]],
+    file: ColumnFile,
     columns: Mapping[str, str],
     numbers: Mapping[str, float],
+    time: str | None,
+    rate: float | None,
 ) -> Trial:
-    infos = measurable(manifest, columns)
-    chosen = dict(columns) or {key: key for key in table if key in infos}
-    faults = [unknown_name(f"column of {name}", column, table) for column in chosen.values() if column not in table]
-    axis, unit = ("frequency", "Hz") if "frequency" in table else ("time", "s")
-    if axis not in table:
-        faults.append(f"{name} has no time. Allowed: a variable `time` or `frequency`; the first column of a CSV file.")
+    infos, name = measurable(manifest, columns), file.name
+    chosen = dict(columns) or {one.name: one.head for one in file.columns if one.name in infos}
     if not chosen:
-        faults.append(
-            f"{name}: none of its columns ({', '.join(table) or 'none'}) is an output of the scene. Name them so, or "
+        listed = ", ".join(show(one.head) for one in file.columns) or "none"
+        raise RequestError(
+            f"{name}: none of its columns ({listed}) is an output of the scene. Name them so, or "
             'say which is which: "outer.y=COLUMN" (--signal).'
         )
-    if faults:
-        raise RequestError("\n".join(faults))
-    t = _in_si(f"{name}, {axis}", *table[axis], unit)
-    found = {key: _in_si(f"{name}, {column}", *table[column], infos[key].unit) for key, column in chosen.items()}
+    found = {key: file.si(file.column(column), infos[key].unit) for key, column in chosen.items()}
+    frequency = [one for one in file.columns if one.name.casefold() == "frequency"]
+    axis = "frequency" if frequency and time is None and rate is None else "time"
+    t = file.si(frequency[0], "Hz") if axis == "frequency" else file.time(time, rate)
     if t.ndim != 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0.0):
         raise RequestError(
             f"{name}: values of {axis} do not increase throughout. Allowed: increasing finite numbers. Sort them."
@@ -233,11 +273,6 @@ def _trial(
     return Trial(name=name, t=np.zeros(0), signals={}, parameters=dict(numbers), quantities=tuple(spectra))
 
 
-def _in_si(what: str, values: np.ndarray, unit: str, wanted: str) -> np.ndarray:
-    """Values in the output's unit; without a unit they are."""
-    return values if unit in ("", wanted) else values * _quantity(what, f"1 {unit}", wanted)
-
-
 def _quantity(what: str, text: str, unit: str) -> float:
     try:
         return parse_quantity(text, unit)
@@ -247,77 +282,23 @@ def _quantity(what: str, text: str, unit: str) -> float:
 
 def quantities_in(source: Source) -> list[str]:
     """Names of quantities in the rows of a CSV file; none of other files, and of mappings."""
-    if not isinstance(source, str | Path) or Path(source).suffix == ".nc":
-        return []
-    heads, rows, _ = _lines(source)
-    return [cells[0].strip() for cells in csv.reader(rows[1:])] if _are_quantities(heads) else []
+    return [cells[0] for cells in _rows_of_quantities(Path(source))[0]] if isinstance(source, str | Path) else []
 
 
-def _are_quantities(heads: Sequence[tuple[str, str]]) -> bool:
-    return bool(heads) and heads[0][0] == "quantity"
+def _rows_of_quantities(path: Path) -> tuple[list[list[str]], dict[str, str]]:
+    """Rows below a line that begins with ``quantity``, and assignments in comments; none of other files."""
+    if path.suffix == ".nc":
+        return [], {}
+    lines = text_lines(path, path.name)
+    for separator in SEPARATORS:
+        first = rows_of(lines[:SAMPLE], separator, path.name)[:1]
+        if first and first[0][1][0] == "quantity" and len(first[0][1]) > 1:
+            said = dict(assigned(line) for line in lines if line.startswith("#") and "=" in line)
+            return [cells for _, cells in rows_of(lines, separator, path.name)[1:]], said
+    return [], {}
 
 
-def _lines(path: str | Path) -> tuple[list[tuple[str, str]], list[str], dict[str, str]]:
-    """Names and units of the columns of a CSV file, its lines from the first one on, and assignments in comments."""
-    try:
-        text = read_file(path, LARGEST).decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "it is not text in UTF-8"
-        raise RequestError(f"{path}: cannot be read: {why}. Allowed: a CSV file, or NetCDF (.nc).") from None
-    lines = [line for line in text.splitlines() if line.strip()]
-    said = dict(_assigned(line) for line in lines if line.startswith("#") and "=" in line)
-    rows = [line for line in lines if not line.startswith("#")]
-    return [_head(cell) for cell in next(csv.reader(rows[:1]), [])], rows, said
-
-
-def _csv(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
-    """Columns with their units, or rows of quantities, and assignments in comments."""
-    heads, rows, said = _lines(path)
-    if _are_quantities(heads):
-        return {"quantity": (list(csv.reader(rows[1:])), "")}, said
-    try:
-        values = np.loadtxt(rows[1:], delimiter=",", ndmin=2, converters=lambda cell: float(cell.strip() or "nan"))
-    except ValueError as error:
-        raise RequestError(f"{path}: {error}. Allowed: numbers with commas between, below a line of names.") from None
-    if not heads or values.shape[1:] != (len(heads),):
-        raise RequestError(f"{path}: {len(heads)} names for {values.shape[-1]} columns. Name each in the first line.")
-    table = {name: (column, unit) for (name, unit), column in zip(heads, values.T, strict=True)}
-    axis = "frequency" if heads[0][0] == "frequency" else "time"
-    return {axis: (values[:, 0], heads[0][1])} | table, said
-
-
-def _assigned(line: str) -> tuple[str, str]:
-    name, _, value = line.lstrip("# ").partition("=")
-    return name.strip(), value.strip()
-
-
-def _head(cell: str) -> tuple[str, str]:
-    """Name of a column, and its unit from brackets behind it."""
-    name, _, unit = cell.strip().rstrip("]").partition("[")
-    return name.strip(), unit.strip()
-
-
-def _netcdf(path: str | Path) -> tuple[dict[str, tuple[Any, str]], dict[str, str]]:
-    """Variables of one dimension with their units, and attributes that are texts."""
-    import h5netcdf
-
-    try:
-        refuse_other(Path(path))
-        stored = h5netcdf.File(path, "r")
-    except (OSError, ValueError) as error:
-        why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"
-        raise RequestError(f"{path}: cannot be read: {why}. Allowed: NetCDF-4, or a CSV file.") from None
-    with stored:
-        table = {
-            name: (np.asarray(item[...], dtype=float), str(item.attrs.get("units", "")))
-            for name, item in stored.variables.items()
-            if item.ndim == 1 and item.dtype.kind in "fiu"
-        }
-        said = {name: value for name, value in stored.attrs.items() if isinstance(value, str)}
-    return table, said
-
-
-def read_columns(signals: str | Sequence[str] | None) -> dict[str, str]:
+def columns_by_output(signals: str | Sequence[str] | None) -> dict[str, str]:
     """Columns by output from texts such as ``outer.y=outer_y_m``.
 
     Raises

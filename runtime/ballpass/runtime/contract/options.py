@@ -238,6 +238,28 @@ SampleRate = Annotated[
     ),
 ]
 
+# ------------------------------------------------------------------------------------------------- files of recordings
+
+TimeColumn = Annotated[
+    str | None,
+    Option(
+        words="Column of the times; else the one that has the name or the unit of a time.",
+        example='"elapsed [ms]"',
+        shown="COLUMN",
+    ),
+]
+
+RecordedRate = Annotated[
+    float | None,
+    Option(
+        words="Samples a second of the recording, in place of a column of times.",
+        example='"20 kHz"',
+        shown="RATE",
+        unit="Hz",
+        above=0.0,
+    ),
+]
+
 # ------------------------------------------------------------------------------------------------------- which instant
 
 Instant = Annotated[

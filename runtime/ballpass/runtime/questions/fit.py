@@ -12,7 +12,7 @@ import numpy as np
 from ballpass.runtime.ask.fit_report import FitAnswer, FittedNumber, FittedSignal
 from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
+from ballpass.runtime.contract.options import Cycles, Option, RecordedRate, Rtol, TimeColumn, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -118,6 +118,8 @@ def fit(
     vary: Vary,
     signal: SignalColumns = None,
     *,
+    time: TimeColumn = None,
+    rate: RecordedRate = None,
     begin: Begin = None,
     shift: Shift = None,
     gain: Gain = False,
@@ -164,7 +166,7 @@ def fit(
 
     from ballpass.runtime.ask.fitting import best_of, fit_unknowns
     from ballpass.runtime.ask.kept_parts import kept_parts
-    from ballpass.runtime.ask.measured import read_columns, read_trial
+    from ballpass.runtime.ask.measured import columns_by_output, read_trial
     from ballpass.runtime.ask.misfit import Misfit
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.run.locating import refuse_jumps
@@ -173,11 +175,12 @@ def fit(
     texts = [vary] if isinstance(vary, str) else list(vary)
     ranges = [parameter_range(model.manifest.parameters, "vary", text) for text in texts]
     sources = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
-    columns = read_columns(signal)
+    columns = columns_by_output(signal)
     tolerance = FIT_RTOL if rtol is None else rtol
+    trials = [read_trial(model.manifest, one, columns, k, time, rate) for k, one in enumerate(sources, start=1)]
     misfit = Misfit(
         model,
-        [read_trial(model.manifest, source, columns, k) for k, source in enumerate(sources, start=1)],
+        trials,
         ranges,
         begin=0.0 if begin is None else begin,
         shift=_shift(shift),
@@ -201,7 +204,8 @@ def fit(
         # all in the noise of the best, for their noises differ
         best = min((one for _, one in found), key=lambda one: float(np.sum(np.log(one.noise))))
         _refuse_chaos(model, misfit, best)
-        return _answer(misfit, best, found, loss=loss, profile=profile, rtol=tolerance)
+        notes = tuple(note for trial in trials for note in trial.notes)
+        return _answer(misfit, best, found, notes=notes, loss=loss, profile=profile, rtol=tolerance)
 
 
 def _shift(text: str | None) -> ParameterRange | None:
@@ -237,6 +241,7 @@ def _answer(
     best: Fitted,
     found: Sequence[tuple[np.ndarray, Fitted]],
     *,
+    notes: tuple[str, ...],
     loss: str,
     profile: bool,
     rtol: float,
@@ -308,6 +313,7 @@ def _answer(
         profile=profile,
         rtol=rtol,
         converged=best.converged,
+        notes=notes,
     )
 
 

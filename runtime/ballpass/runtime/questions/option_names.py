@@ -96,9 +96,9 @@ def states(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> Non
 
 def measured(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Outputs that columns of measured data hold: ``outer.y=probe_2``."""
-    from ballpass.runtime.ask.measured import measurable, read_columns
+    from ballpass.runtime.ask.measured import columns_by_output, measurable
 
-    columns = read_columns(texts)
+    columns = columns_by_output(texts)
     if manifest is not None:
         measurable(manifest, columns)
 

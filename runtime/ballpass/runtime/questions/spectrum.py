@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
-from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.contract.options import Cycles, Duration, Option, RecordedRate, Rtol, TimeColumn, Transient
+from ballpass.runtime.contract.units import printed_unit, show, table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.ratings.of_bearing import bearing_words
@@ -41,6 +42,12 @@ ROUNDING = 1e-13
 SAMPLES = 1000
 LEAST_READING = 0.99
 
+#: Fewest samples of a recording.
+FEWEST = 16
+
+#: Options of runs.
+_OF_RUNS = ("sample_rate", "cycles", "duration", "transient", "rtol", "sensor")
+
 #: What the short names of characteristic frequencies stand for.
 MEANINGS = {
     "FTF": "turns of the cage",
@@ -60,12 +67,23 @@ SampleRate = Annotated[
     ),
 ]
 Of = Annotated[
-    str,
+    str | None,
     Option(
         words="Output or state with one value: `inner.y`, or `inner.ax` where `run.outputs` names it.",
         shown="OUTPUT",
         names=option_names.signals,
     ),
+]
+Recording = Annotated[
+    str | Path | None,
+    Option(
+        words="A measured signal instead of a run: a CSV or NetCDF file. The scene's bearings name its lines.",
+        shown="FILE",
+        reader=Path,
+    ),
+]
+SignalColumn = Annotated[
+    str | None, Option(words="Column of the recording; the only one beside the time if not given.", shown="COLUMN")
 ]
 Band = Annotated[
     tuple[float, float] | None,
@@ -124,6 +142,7 @@ class SignalSpectrum(ShortRepr, Reported):
     statistics : of the signal
     solution : its steady part
     warnings : what to mind
+    notes : how a recording was read
 
     Examples
     --------
@@ -149,6 +168,7 @@ class SignalSpectrum(ShortRepr, Reported):
     statistics: DiagnosisStatistics
     solution: Solution
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -207,7 +227,8 @@ class SignalSpectrum(ShortRepr, Reported):
         )
         marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
         unit, s = "" if self.orders else " Hz", self.statistics
-        said = [f"{marks}{unit}; lines of the spectrum are {self.resolution:.3g}{unit} apart"] if marks else []
+        said = [*self.notes]
+        said += [f"{marks}{unit}; lines of the spectrum are {self.resolution:.3g}{unit} apart"] if marks else []
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         abbreviated = bearing_words(abbreviated, self.solution.manifest.bearings)
@@ -252,6 +273,19 @@ def _lowest_reading(window: str) -> float:
 
 
 def _check(values: Mapping[str, Any]) -> None:
+    recorded = values["recording"] is not None
+    if (values["of"] is not None) == recorded:
+        raise RequestError(
+            "--recording gives the signal, and --of was given as well. Omit one of the two."
+            if recorded
+            else "--of is missing. It takes: output or state with one value, as inner.y. Or give a measured signal: "
+            "--recording FILE."
+        )
+    of_run = [f"--{name.replace('_', '-')}" for name in _OF_RUNS if recorded and values[name] is not None]
+    of_recording = [f"--{name}" for name in ("signal", "time", "rate") if not recorded and values[name] is not None]
+    for wrong in (*of_run, *of_recording):
+        what = "a run, and --recording gives the signal" if recorded else "a recording, and there is no --recording"
+        raise RequestError(f"{wrong} is of {what}. Omit it.")
     if values["kurtogram"] and values["envelope"] is not None:
         raise RequestError("--kurtogram chooses the band, and --envelope was given as well. Omit one of the two.")
     if values["orders"] and values["scaling"] != "amplitude":
@@ -302,8 +336,12 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
 @Question(stage="spectrum", samples=True, needs="scipy", check=_check, figures=_figures, always=True, takes_runs=True)
 def spectrum(
     model: AnyModel,
-    of: Of,
+    of: Of = None,
     *,
+    recording: Recording = None,
+    signal: SignalColumn = None,
+    time: TimeColumn = None,
+    rate: RecordedRate = None,
     envelope: Band = None,
     kurtogram: Kurtogram = False,
     sensor: ThroughSensor = None,
@@ -322,7 +360,8 @@ def spectrum(
 ) -> SignalSpectrum:
     """The highest lines of a signal of the steady motion, each with its name: BPFO, BPFI, 2 BSF, FTF, the shaft.
 
-    Without a length the run has as many turns as tell the ball pass from the shaft's multiples.
+    The signal is an output of a run, or a recording of the machine in its own unit. Without a length the run has as
+    many turns as tell the ball pass from the shaft's multiples.
 
     Parameters
     ----------
@@ -348,7 +387,16 @@ def spectrum(
     from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines, mean_speeds
     from ballpass.runtime.run.solution import Solution
 
-    if isinstance(model, Solution):
+    channel, notes, warnings = of or "", tuple[str, ...](), tuple[str, ...]()
+    if recording is not None:
+        changing = isinstance(model, Solution) or (model.manifest.mechanism and model.manifest.mechanism.angle)
+        if changing and (orders or spectrogram or isinstance(model, Solution)):
+            raise RequestError(
+                "--recording: its lines are named by a scene, over orders and time by one of constant speed. Allowed: "
+                "ballpass spectrum SCENE --recording FILE. Give a scene, with the speed of the recording (--set)."
+            )
+        run, channel, unit, notes = _recorded(model, Path(recording), signal, time, rate, parameters)
+    elif isinstance(model, Solution):
         if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):
             raise RequestError(
                 "This is a finished run: options of a simulation do not apply. Allowed: --of, --envelope, "
@@ -357,7 +405,7 @@ def spectrum(
         run = model if transient is None else replace(model, transient_cycles=transient)
         warnings = _too_slow(run)
     else:
-        states, warnings = [info.name for info in model.manifest.states], ()
+        states = [info.name for info in model.manifest.states]
         scene_rate = _scene_rate(model.manifest, model.numbers(parameters).values)
         finest = scene_rate if sensor is None else max(scene_rate, sensor.rate)
         wanted = finest if sample_rate is None and finest > scene_rate else sample_rate
@@ -368,46 +416,49 @@ def spectrum(
             parameters=parameters,
             rtol=rtol,
             sample_rate=None if wanted is None else wanted * max(1, math.ceil(finest / wanted)),
-            outputs=[] if of in states and of not in model.outputs else [of],
+            outputs=[] if channel in states and channel not in model.outputs else [channel],
             progress=progress,
         )
-    if run[of].ndim != 1:
-        ball = bearing_words("ball", run.manifest.bearings, of)
-        raise RequestError(f"--of: {of} has one value for each {ball}. Allowed: an output with one value, as inner.ax.")
+    if run[channel].ndim != 1:
+        ball = bearing_words("ball", run.manifest.bearings, channel)
+        raise RequestError(
+            f"--of: {channel} has one value for each {ball}. Allowed: an output with one value, as inner.ax."
+        )
     if sensor is not None:
-        run = replace(run, outputs={**run.outputs, of: _measured(run, of, sensor)})
+        run = replace(run, outputs={**run.outputs, channel: _measured(run, channel, sensor)})
     solution = run.steady()
-    signal = solution[of]
-    numbers = mean_speeds(solution)
+    samples = solution[channel]
+    numbers = mean_speeds(solution) if recording is None else {**run.parameters, **run.constants}
     kurtosis = None
     if kurtogram:
         fastest = max((mark.frequency for mark in characteristic_lines(solution.manifest, numbers)), default=0.0)
-        best = kurtogram_of(solution.t, signal, WIDTHS * fastest)[0]
+        best = kurtogram_of(solution.t, samples, WIDTHS * fastest)[0]
         envelope, kurtosis = (best.low, best.high), best.kurtosis
-    values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
-    time, even = solution.t[:-1], values[:-1]  # the end of a whole number of turns is their start again
-    unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
+    values = samples if envelope is None else envelope_of(solution.t, samples, envelope)
+    t, even = solution.t[:-1], values[:-1]  # the end of a whole number of turns is their start again
+    if recording is None:
+        unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == channel), "")
     if orders or scaling == "amplitude":
         if orders:
             lines = order_spectrum(_angle(solution), values, window=window)
         else:
-            lines = amplitude_spectrum(time, even, window=window)
+            lines = amplitude_spectrum(t, even, window=window)
         position, height, resolution = lines.frequency, lines.amplitude, lines.resolution
         height_unit = unit
     else:
         kind: Literal["spectrum", "density"] = "spectrum" if scaling == "power" else "density"
-        power = power_spectrum(time, even, window=window, scaling=kind)
+        power = power_spectrum(t, even, window=window, scaling=kind)
         position, height, resolution = power.frequency, power.power, power.resolution
         height_unit = f"({unit})^2" + ("/Hz" if scaling == "density" else "")
     if sample_rate is not None and not orders:
         within = position <= 0.5 * sample_rate * (1.0 + 1e-9)
         position, height = position[within], height[within]
     marks = characteristic_lines(solution.manifest, numbers, orders=orders)
-    if not carries_lines(solution.manifest, of):
+    if recording is None and not carries_lines(solution.manifest, channel):
         marks = tuple(mark for mark in marks if not mark.of_bearing)
     changing = run.period is None and run.cycle_length is not None
     return SignalSpectrum(
-        of=of,
+        of=channel,
         unit=unit,
         envelope=envelope,
         kurtosis=kurtosis,
@@ -421,10 +472,72 @@ def spectrum(
         resolution=resolution,
         highest=_peaks(height, top, ROUNDING if height_unit == unit else ROUNDING**2),
         marks=() if changing and not orders else marks,
-        statistics=diagnosis(signal),
+        statistics=diagnosis(samples),
         solution=solution,
         warnings=warnings,
+        notes=notes,
     )
+
+
+def _recorded(
+    model: AnyModel,
+    path: Path,
+    signal: str | None,
+    time: str | None,
+    rate: float | None,
+    parameters: Mapping[str, float] | None,
+) -> tuple[Solution, str, str, tuple[str, ...]]:
+    """A recording in place of a run, its column, its unit, and words on how it was read."""
+    from ballpass.runtime.ask.measured import said_numbers
+    from ballpass.runtime.contract.columns import read_columns
+    from ballpass.runtime.contract.status import Status
+    from ballpass.runtime.run.driver_angle import TURN, shaft_speed
+    from ballpass.runtime.run.solution import Solution, Statistics
+
+    file = read_columns(path)
+    t = file.time(time, rate)
+    clock = file.time_column(time).head if rate is None else None
+    others = [one.head for one in file.columns if one.head != clock]
+    if signal is None and len(others) != 1:
+        listed = ", ".join(map(show, others)) or "none"
+        raise RequestError(f"--signal: {path.name} has several columns. Allowed: {listed}. Name one.")
+    column = file.column(signal or others[0])
+    samples = file.numbers(column)
+    if len(t) < FEWEST or not (np.all(np.isfinite(t)) and np.all(np.isfinite(samples)) and np.all(np.diff(t) > 0.0)):
+        raise RequestError(
+            f"{path.name}: {len(t)} rows. Allowed: {FEWEST} or more, each with a number, and times that increase. "
+            "Leave out rows without a number at the ends, or fill them."
+        )
+    said, left_out = said_numbers(model.manifest, path.name, file.said)
+    numbers = model.numbers({**said, **(parameters or {})})
+    turns = shaft_speed(model.manifest, numbers.values) / TURN
+    run = Solution(
+        t=t,
+        x=np.zeros((len(t), len(model.manifest.states))),
+        outputs={column.name: samples},
+        parameters=numbers.parameters,
+        constants=numbers.constants,
+        cycle_length=1.0 / abs(turns) if turns else None,
+        transient_cycles=0.0,
+        manifest=model.manifest,
+        statistics=Statistics(
+            method="recording",
+            reason=str(path),
+            rtol=0.0,
+            magnitudes=(),
+            steps=None,
+            rejected=None,
+            segments=0,
+            calls=0,
+            wall_time=0.0,
+            compiled=False,
+        ),
+        status=Status.DONE,
+    )
+    layout = f" ({file.layout})" if file.layout else ""
+    words = f"{column.head} of {path.name}{layout}: {len(t)} samples in {t[-1] - t[0]:.6g} s"
+    speed = f"lines are those at {60.0 * abs(turns):.6g} rpm; --set gives the speed of the recording"
+    return run, column.name, printed_unit(column.unit), (words, speed, *left_out)
 
 
 def _measured(run: Solution, of: str, sensor: Sensor) -> np.ndarray:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ballpass.runtime.contract.columns import read_columns
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
 #: Order of the low-pass: 0.9 of a sine at 0.91 of its frequency are left, a 256th at twice it.
@@ -23,8 +23,6 @@ LOW_PASS_ORDER = 8
 FINER = 10.0
 #: What is left of a ringing when it counts as over.
 OVER = 1e-6
-#: Bytes of a transfer function at most.
-LARGEST_TRANSFER = 50_000_000
 
 _UNITS = {"resonance": "Hz", "low_pass": "Hz"}
 
@@ -225,14 +223,17 @@ def sensor_of_text(text: str) -> Sensor:
 
 
 def _read_transfer(path: Path) -> tuple[tuple[float, float, float], ...]:
-    """Rows of frequency [Hz], gain and phase [deg, 0 where there is no third column]."""
-    allowed = "Allowed: a table of frequency in Hz, gain, and optionally phase in deg, with commas, a row a line."
+    """Rows of frequency [Hz], gain and phase [rad, 0 where there is no such column]."""
     try:
-        text = read_file(path, LARGEST_TRANSFER).decode("utf-8-sig")
-        rows = np.loadtxt(text.splitlines(), delimiter=",", ndmin=2)
-    except (OSError, ValueError) as fault:
-        raise RequestError(f"transfer: {path} cannot be read: {fault}. {allowed}") from None
-    if rows.shape[1] not in (2, 3):
-        raise RequestError(f"transfer: {path} has {rows.shape[1]} columns. {allowed}")
-    phase = np.radians(rows[:, 2]) if rows.shape[1] == 3 else np.zeros(len(rows))
-    return tuple(zip(rows[:, 0].tolist(), rows[:, 1].tolist(), phase.tolist(), strict=True))
+        file = read_columns(path, str(path))
+        named = {one.name: one.head for one in file.columns}
+        keys = [named.get(name, str(k)) for k, name in enumerate(("frequency", "gain", "phase"), start=1)]
+        frequency, gain, *phase = (file.column(key) for key in keys[: max(len(file.columns), 2)])
+        rows = [file.si(frequency, "Hz"), file.si(gain, "1")]
+        rows += [file.si(file.in_unit(one, one.unit or "deg"), "rad") for one in phase] or [np.zeros(len(rows[0]))]
+    except RequestError as fault:
+        raise RequestError(
+            f"transfer: {path} cannot be read: {fault} Allowed: columns frequency [Hz], gain, and optionally "
+            "phase [deg], by these names or in this order."
+        ) from None
+    return tuple(zip(*(row.tolist() for row in rows), strict=True))

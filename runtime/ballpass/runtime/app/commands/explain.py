@@ -89,6 +89,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "mechanism": scene.mechanism is not None,
         "title": scene.title,
         "file": str(path),
+        "files_of_columns": list(scene.notes),
         "modelled": parts,
         "not_modelled": [*_absent(scene), *never, *_of_drive(scene)],
         "functions": {f.name: {"operations": f.operations, "what": worded(f.description)} for f in manifest.functions},
@@ -170,6 +171,8 @@ def _absent(scene: Scene) -> list[str]:
 def _render(report: dict[str, Any], said: Explanation) -> Report:
     parts: list[Words | ReportTable] = ["", _modelled(report), "", Marked("Not modelled", "head")]
     parts += [f"  - {text}" for text in report["not_modelled"]]
+    if report["files_of_columns"]:
+        parts += ["", Marked("Files of columns", "head"), *(f"  - {text}" for text in report["files_of_columns"])]
     parts += ["", Marked("States", "head", f": {', '.join(report['states']) or 'none'}"), "", _functions(report)]
     if report["step"]:
         shares = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
