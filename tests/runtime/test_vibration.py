@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -170,3 +171,19 @@ def test_lines_are_named_by_what_turns(make_model: Callable[..., Model]) -> None
 def test_requests_that_no_signal_can_answer_are_refused(call: Callable[[], object], message: str) -> None:
     with pytest.raises(RequestError, match=message):
         call()
+
+
+def test_lines_of_a_recording_are_named_by_the_bearings_of_the_scene(
+    make_model: Callable[..., Model], tmp_path: Path
+) -> None:
+    """Two sines at the shaft's speed and at the ball pass of the 6204, 3.052239 a turn, in m/s^2 over milliseconds."""
+    rotor, t = make_model("rotor"), np.arange(40_000) / 20e3
+    sines = np.sin(2.0 * np.pi * 50.0 * t) + 0.3 * np.sin(2.0 * np.pi * 3.052239 * 50.0 * t)
+    rows = [f"{1e3 * at};{value}" for at, value in zip(t.tolist(), sines.tolist(), strict=True)]
+    (tmp_path / "probe.csv").write_text("\n".join(["# shaft.speed = 3000 rpm", "Zeit [ms];acc (m/s^2)", *rows]))
+    found = rotor.spectrum(recording=tmp_path / "probe.csv", top=2)
+    assert found.names == ("shaft", "BPFO")
+    assert found.position[list(found.highest)] == pytest.approx([50.0, 152.6], abs=0.5)
+    assert found.of == "acc"
+    with pytest.raises(RequestError, match="--of"):
+        rotor.spectrum(recording=tmp_path / "probe.csv", of="inner.y")

@@ -516,7 +516,7 @@ def _recorded(
         x=np.zeros((len(t), len(model.manifest.states))),
         outputs={column.name: samples},
         parameters=numbers.parameters,
-        constants=numbers.constants,
+        constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
         cycle_length=1.0 / abs(turns) if turns else None,
         transient_cycles=0.0,
         manifest=model.manifest,
