@@ -278,8 +278,8 @@ def _check(values: Mapping[str, Any]) -> None:
         raise RequestError(
             "--recording gives the signal, and --of was given as well. Omit one of the two."
             if recorded
-            else "--of is missing. It takes: output or state with one value, as inner.y. Or give a measured signal: "
-            "--recording FILE."
+            else "--of is missing. It takes: output or state with one value: `inner.y`, or `inner.ax` where "
+            "`run.outputs` names it. For a measured signal give --recording FILE."
         )
     of_run = [f"--{name.replace('_', '-')}" for name in _OF_RUNS if recorded and values[name] is not None]
     of_recording = [f"--{name}" for name in ("signal", "time", "rate") if not recorded and values[name] is not None]
