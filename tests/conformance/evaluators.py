@@ -146,9 +146,7 @@ class Evaluators:
         compiler = find_compiler()
         assert compiler is not None
         headers = [*sorted(DRIVER.glob("*.h")), header]
-        library = compile_sources(
-            (shim,), compiler, label="kernels", headers=headers, include=(DRIVER, self.folder), flags=FLAGS
-        )
+        library = compile_sources((shim,), compiler, label="kernels", headers=headers, flags=FLAGS)
         return ctypes.CDLL(str(library.path))
 
     def stages(self, point: Point, h: float) -> np.ndarray:

@@ -332,12 +332,14 @@ def test_a_cache_emptied_while_it_is_used_is_no_trouble(cache: Path, rotor: Path
 
 def test_what_killed_compilers_left_behind_is_deleted_after_a_day(cache: Path, tmp_path: Path) -> None:
     cache.mkdir()
-    old, new = cache / ".model-0-x.tmp", cache / ".model-1-x.tmp"
-    for path in (old, new):
+    old, new = (cache / f".model-{32 * digit}-abcdefgh.tmp" for digit in "01")
+    others = cache / ".notes-x.tmp"  # the user's
+    for path in (old, new, others):
         path.write_bytes(b"half a library")
-    os.utime(old, (0, 0))
+    for path in (old, others):
+        os.utime(path, (0, 0))
     library = compiled(tmp_path)
-    assert {path.name for path in cache.iterdir()} == {new.name, library.path.name}
+    assert {path.name for path in cache.iterdir()} == {new.name, others.name, library.path.name}
 
 
 # ------------------------------------------------------------------------------------------------------------ solutions

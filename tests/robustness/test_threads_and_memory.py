@@ -166,7 +166,7 @@ def test_records_of_the_driver_have_the_layout_that_python_gives_them(name: str,
     source.write_text(f"#include <stddef.h>\n{includes}const long layout[] = {{{numbers}}};\n", encoding="utf-8")
     compiler = find_compiler()
     assert compiler is not None
-    code = ctypes.CDLL(str(compile_sources((source,), compiler, include=(DRIVER,)).path))
+    code = ctypes.CDLL(str(compile_sources((source,), compiler, headers=sorted(DRIVER.glob("*.h"))).path))
     found = list((ctypes.c_long * len(entries)).in_dll(code, "layout"))
     expected = [ctypes.sizeof(record)]
     for field in fields:

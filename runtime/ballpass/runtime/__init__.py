@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.certify.quantity_function import QuantityFunction as QuantityFunction
     from ballpass.runtime.certify.quantity_function import UnknownValueWarning as UnknownValueWarning
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport as SensitivityReport
+    from ballpass.runtime.contract.cache import CacheWarning as CacheWarning
     from ballpass.runtime.contract.errors import ArtefactError as ArtefactError
     from ballpass.runtime.contract.errors import BallpassError as BallpassError
     from ballpass.runtime.contract.errors import BallpassWarning as BallpassWarning
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.many.signals import Signals as Signals
     from ballpass.runtime.model import Model as Model
     from ballpass.runtime.model import load as load
-    from ballpass.runtime.native.compile import CacheWarning as CacheWarning
     from ballpass.runtime.native.compile import NoCompilerWarning as NoCompilerWarning
     from ballpass.runtime.native.loaded_model import NoKernelsWarning as NoKernelsWarning
     from ballpass.runtime.point.equilibrium import FreeRingWarning as FreeRingWarning
@@ -86,7 +86,7 @@ _HOME = {
     "Signals": "many.signals",
     "Model": "model",
     "load": "model",
-    "CacheWarning": "native.compile",
+    "CacheWarning": "contract.cache",
     "NoCompilerWarning": "native.compile",
     "NoKernelsWarning": "native.loaded_model",
     "FreeRingWarning": "point.equilibrium",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -79,14 +80,23 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     >>> model.parameters["bearing.clearance"]  # [m]
     1e-05
     """
+    return _loaded(folder, compiler, partial(read_artefact, folder, verify=verify))
+
+
+def load_own(folder: Path) -> Model:
+    """The model of a scene's folder, which `ForeignFolderError` refuses where this user's ballpass did not write it."""
+    return _loaded(folder, None, partial(read_artefact, folder, own=True))
+
+
+def _loaded(folder: str | Path, compiler: str | None, read: Callable[[], Manifest]) -> Model:
     # absolute: functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
-    manifest = read_artefact(folder, verify=verify)
+    manifest = read()
     try:
         with shown("compiling"):
             library = compile_model(place, manifest, compiler)
     except ArtefactError:  # another process has written the folder anew since the manifest was read
-        manifest = read_artefact(folder, verify=verify)
+        manifest = read()
         library = compile_model(place, manifest, compiler)
     return Model(place, manifest, library, compiler=compiler)
 

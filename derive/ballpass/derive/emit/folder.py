@@ -50,7 +50,7 @@ def write_folder(folder: Path, system: System, functions: LoweredFunctions, sour
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, file_digest(p)) for p in sorted(folder.iterdir()))
-    write_manifest(folder, describe(system, functions, source, files))
+    write_manifest(folder, describe(system, functions, source, files), own=True)
 
 
 def _headers(system: System, functions: LoweredFunctions) -> dict[str, str]:

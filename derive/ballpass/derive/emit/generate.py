@@ -20,16 +20,22 @@ from ballpass.derive.emit.signature import (
     folder_of,
     fresh_manifest,
     info_of,
-    intact_manifest,
     lubrication_info,
     signature,
     source_key,
 )
 from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.cache import was_written
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
-from ballpass.runtime.contract.folder import file_digest, read_manifest, write_manifest
-from ballpass.runtime.contract.folders import locked, replace_files
+from ballpass.runtime.contract.folder import (
+    ForeignFolderError,
+    file_digest,
+    intact_manifest,
+    read_manifest,
+    write_manifest,
+)
+from ballpass.runtime.contract.folders import locked, read_file, replace_files
 from ballpass.runtime.show.progress import shown
 
 if TYPE_CHECKING:
@@ -109,7 +115,7 @@ def generate(
         return folder_of(scene, out)
     read, source = _read(scene)
     folder = folder_of(scene, out)
-    present = None if force else intact_manifest(folder)
+    present = None if force else _own_manifest(folder, say)
     if present is not None and present.signature == signature(read):
         look(present)
         _refresh(folder, present, read, source)
@@ -159,6 +165,17 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderChe
         fresh = _digests(Path(made))
     stale = sorted(name for name in fresh.keys() | present.keys() if fresh.get(name) != present.get(name))
     return FolderCheck(folder=folder, stale=tuple(stale))
+
+
+def _own_manifest(folder: Path, say: Callable[[str], None]) -> mf.Manifest | None:
+    """The folder's manifest where its digests fit the files, and this user's ballpass wrote them."""
+    try:
+        return intact_manifest(folder, own=True)
+    except ForeignFolderError:
+        say(f"{folder} was not written by your ballpass: nothing of it is executed, it is derived anew")
+    except ArtefactError:
+        pass
+    return None
 
 
 def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
@@ -214,7 +231,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
 
         derive(scene)  # refuses a linkage that locks with its new numbers
     with locked(folder):
-        write_manifest(folder, updated)
+        write_manifest(folder, updated, own=True)
 
 
 def _refuse_foreign(folder: Path) -> None:
@@ -238,6 +255,7 @@ def _refuse_foreign(folder: Path) -> None:
 def _written(folder: Path) -> set[str]:
     """Names of the files in a folder that a derivation wrote, this version's or the one that left the manifest."""
     names = set(GENERATED)
-    with contextlib.suppress(ArtefactError):
-        names |= {name for name, _ in read_manifest(folder).files if Path(name).name == name}
+    with contextlib.suppress(OSError, ArtefactError):
+        if was_written(read_file(folder / mf.FILE_NAME)):  # another's may name files of the user
+            names |= {name for name, _ in read_manifest(folder).files}
     return {name for name in names if (folder / name).is_file() and not (folder / name).is_symlink()}

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime.contract import manifest as mf
-from ballpass.runtime.contract.errors import ArtefactError
-from ballpass.runtime.contract.folder import check_files, read_manifest
+from ballpass.runtime.contract.folder import intact_manifest
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.contract.version import __version__
 
@@ -68,24 +67,14 @@ def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
 
 
 def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> mf.Manifest | None:
-    """Manifest of a scene file's folder where both are unchanged since it was written, else None."""
+    """Manifest of a scene file's folder where both are unchanged since this user's ballpass wrote it, else None."""
     if not isinstance(scene, str | Path):
         return None
-    present = intact_manifest(folder_of(scene, out))
     try:
-        return present if present is not None and present.source == source_key(Path(scene)) else None
-    except (OSError, ValueError):  # no such file, no path: the reader reports it
+        present = intact_manifest(folder_of(scene, out), own=True)
+        return present if present.source == source_key(Path(scene)) else None
+    except (OSError, ValueError):  # not written or not by this user; no such file, no path: the reader reports it
         return None
-
-
-def intact_manifest(folder: Path) -> mf.Manifest | None:
-    """The folder's manifest where its digests fit the files."""
-    try:
-        present = read_manifest(folder)
-        check_files(folder, present)
-    except ArtefactError:
-        return None
-    return present
 
 
 def info_of(kind: type[T], record: object, **others: Any) -> T:

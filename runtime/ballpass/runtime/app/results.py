@@ -57,7 +57,7 @@ def write_results(
     ----------
     folder : to be written, made where it is missing
     write : writes solution and figures into the folder it is called with; gives the summary
-    figures : names of all figures there are: those that the new run does not write are deleted, as they are outdated
+    figures : names of all figures there are: beside a summary, those that the new run does not write are deleted
 
     Returns
     -------
@@ -75,7 +75,10 @@ def write_results(
         (made / SUMMARY).write_text(json_text(summary), encoding="utf-8")
         return summary
 
-    summary = replace_files(folder, write_all, last=SUMMARY, owned=lambda: figures)
+    def outdated() -> Collection[str]:
+        return figures if (folder / SUMMARY).exists() else ()
+
+    summary = replace_files(folder, write_all, last=SUMMARY, owned=outdated)
     return summary, sorted((*summary[FILES], SUMMARY))
 
 

@@ -7,19 +7,27 @@ from __future__ import annotations
 
 import hashlib
 import io
-import shutil
+import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from warnings import warn
 
 import numpy as np
 
+from ballpass.runtime.contract.errors import BallpassWarning, RequestError
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: Ending of a part's file, and bytes of the digest at its end.
+ENDING, SEAL = ".ballpass-part", 64
+
+#: Names of parts, and of those that were being written when the process was killed.
+_PART = re.compile(rf"[0-9a-f]{{32}}{ENDING}|\.[0-9a-f]{{32}}{ENDING}-[a-z0-9_]{{8}}")
 
 #: Arrays of a part; texts as well, but no objects.
 Arrays = tuple[np.ndarray, ...]
@@ -32,10 +40,15 @@ class KeptParts:
     ----------
     folder : of their files; None to keep nothing
     decides : what decides all of them
+
+    Attributes
+    ----------
+    used : names of parts that were read or written
     """
 
     def __init__(self, folder: Path | None, decides: tuple[Any, ...]) -> None:
         self._folder, self._digest = folder, _digest(decides)
+        self.used: set[str] = set()
 
     def once(self, key: np.ndarray, compute: Callable[[], Arrays], what: str = "") -> Arrays:
         """Arrays of a part, from its file where there is one.
@@ -47,34 +60,73 @@ class KeptParts:
         """
         if self._folder is None:
             return compute()
-        path = self._folder / f"{_digest((self._digest, what, key))}.npz"
-        try:
-            with np.load(io.BytesIO(path.read_bytes())) as stored:
+        name = _digest((self._digest, what, key))
+        path = self._folder / f"{name}{ENDING}"
+        self.used.add(name)
+        content = path.read_bytes() if path.exists() else b""
+        written, seal = content[:-SEAL], content[-SEAL:]
+        if seal == _seal(name, written):  # else cut, emptied or overwritten: made again
+            with np.load(io.BytesIO(written)) as stored:
                 return tuple(stored[f"arr_{k}"] for k in range(len(stored.files)))
-        except (FileNotFoundError, BadZipFile):  # not there, or cut since: made again
-            found = compute()
-        written = io.BytesIO()
-        np.savez(written, *found)
-        replace_file(path, written.getvalue())
+        found = compute()
+        stream = io.BytesIO()
+        np.savez(stream, *found)
+        replace_file(path, stream.getvalue() + _seal(name, stream.getvalue()))
         return found
 
 
 @contextmanager
 def kept_parts(folder: str | Path | None, model: LoadedModel, *decides: Any) -> Iterator[KeptParts]:
-    """Keep parts while this lasts; the folder is deleted where it ends without an error.
+    """Keep parts while this lasts; those that were used are deleted where it ends without an error.
 
     Parameters
     ----------
-    folder : None to keep nothing
+    folder : None to keep nothing; deleted at the end where nothing else is in it, as parts of another request
     decides : what decides the results beside the model: arrays, and what has a faithful `repr`
+
+    Raises
+    ------
+    RequestError
+        The folder holds other files than parts, or is none.
     """
     if folder is None:
         yield KeptParts(None, ())
         return
     place = Path(folder)
+    refuse_other_files(place)
     place.mkdir(parents=True, exist_ok=True)
-    yield KeptParts(place, (__version__, asdict(model.manifest), *decides))
-    shutil.rmtree(place)
+    parts = KeptParts(place, (__version__, asdict(model.manifest), *decides))
+    yield parts
+    try:
+        for path in place.iterdir():
+            if path.name.removeprefix(".").partition(".")[0] in parts.used:
+                path.unlink(missing_ok=True)
+        if not place.is_symlink() and not any(place.iterdir()):
+            place.rmdir()
+    except OSError as fault:
+        warn(
+            f"{place}: the kept parts could not be deleted ({fault.strerror}). The answer is complete; delete them.",
+            BallpassWarning,
+            stacklevel=3,
+        )
+
+
+def refuse_other_files(place: Path) -> None:
+    """Refuse a folder for parts that holds files of others, before anything is computed."""
+    if place.is_dir():
+        others = sorted(path.name for path in place.iterdir() if not _PART.fullmatch(path.name) or not path.is_file())
+    else:
+        others = [place.name] if os.path.lexists(place) else []
+    if others:
+        raise RequestError(
+            f"{place}: files that are no parts of a computation are there ({', '.join(others[:5])}). Allowed: a folder "
+            "that is new, empty, or holds what a killed call kept. Nothing was changed. Move them, or give another one."
+        )
+
+
+def _seal(name: str, content: bytes) -> bytes:
+    """Digest behind the content of a part, with the name of its file: another part is no substitute."""
+    return hashlib.sha256(name.encode() + content).hexdigest().encode()
 
 
 def _digest(parts: tuple[Any, ...]) -> str:

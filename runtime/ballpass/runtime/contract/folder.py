@@ -8,22 +8,30 @@ from dataclasses import replace
 from pathlib import Path
 
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.cache import note_written, was_written
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.folders import read_file, read_whole, replace_file
 from ballpass.runtime.contract.manifest import FILE_NAME, Manifest
 
 
-def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
+class ForeignFolderError(ArtefactError):
+    """A folder in the place of a scene's that this user's ballpass did not write: it is not executed."""
+
+
+def read_artefact(folder: str | Path, *, verify: bool = True, own: bool = False) -> Manifest:
     """Manifest of a generated folder whose files are those it describes.
 
     Parameters
     ----------
     verify : False takes edited files as they are: the manifest then has the digests of the files
+    own : refuse a folder that this user's ballpass did not write
 
     Raises
     ------
     ArtefactError
         See `read_manifest` and `check_files`; or the folder was written with another version of CasADi.
+    ForeignFolderError
+        The folder must be the user's own, and is not.
     """
     place = Path(folder)
     if not verify:
@@ -31,12 +39,7 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
         present = [name for name, _ in manifest.files if (place / name).exists()]
         return replace(manifest, files=tuple((name, file_digest(place / name)) for name in present))
 
-    def consistent() -> Manifest:
-        manifest = read_manifest(folder)
-        check_files(folder, manifest)
-        return manifest
-
-    manifest = read_whole(place, consistent, ArtefactError)
+    manifest = read_whole(place, lambda: intact_manifest(folder, own=own), ArtefactError)
     _check_version(folder, manifest)
     return manifest
 
@@ -68,9 +71,33 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     >>> read_manifest("generated/punching_press").scene
     'punching_press'
     """
+    return _parsed(folder, _manifest_bytes(folder), verify=verify)
+
+
+def intact_manifest(folder: str | Path, *, own: bool) -> Manifest:
+    """Manifest of a folder whose files have its digests; see `read_artefact`."""
+    content = _manifest_bytes(folder)
+    manifest = _parsed(folder, content)
+    check_files(folder, manifest)
+    if own and not was_written(content):
+        raise ForeignFolderError(
+            f"{folder}: your ballpass did not write this folder, or its cache was emptied since. It is a program: "
+            "nothing of it was executed. Write it again with `ballpass derive`, or name the folder itself in place of "
+            "the scene if you trust it."
+        )
+    return manifest
+
+
+def _parsed(folder: str | Path, content: bytes, *, verify: bool = True) -> Manifest:
+    return Manifest.from_json(content.decode(), source=str(Path(folder) / FILE_NAME), verify=verify)
+
+
+def _manifest_bytes(folder: str | Path) -> bytes:
+    """Content of the manifest, which is text in UTF-8; errors as for `read_manifest`."""
     path = Path(folder) / FILE_NAME
     try:
-        text = read_file(path).decode()
+        content = read_file(path)
+        content.decode()
     except (FileNotFoundError, NotADirectoryError) as fault:
         what = "the folder has no" if Path(folder).is_dir() else "there is no folder with a"
         raise ArtefactError(
@@ -81,13 +108,20 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
             f"{path}: cannot be read ({fault}). A folder that `ballpass derive` wrote, and that you may read, "
             "is expected."
         ) from fault
-    return Manifest.from_json(text, source=str(path), verify=verify)
+    return content
 
 
-def write_manifest(folder: str | Path, manifest: Manifest) -> Path:
-    """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it."""
-    target = Path(folder) / FILE_NAME
-    replace_file(target, manifest.to_json().encode())
+def write_manifest(folder: str | Path, manifest: Manifest, *, own: bool = False) -> Path:
+    """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it.
+
+    Parameters
+    ----------
+    own : note that this user's ballpass wrote the folder
+    """
+    target, content = Path(folder) / FILE_NAME, manifest.to_json().encode()
+    replace_file(target, content)
+    if own:
+        note_written(content)
     return target
 
 

@@ -92,6 +92,16 @@ def replace_file(path: Path, content: bytes) -> None:
         raise
 
 
+@contextlib.contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """A place for a large file on the disk of another one, to be put in its place when all went well."""
+    refuse_other(path)
+    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}-") as folder:
+        made = Path(folder) / path.name
+        yield made
+        os.replace(made, path)
+
+
 def replace_files(
     folder: Path, write: Callable[[Path], _Content], *, last: str, owned: Callable[[], Collection[str]]
 ) -> _Content:
@@ -118,7 +128,7 @@ def replace_files(
         ) from fault
     try:
         with locked(folder):
-            for left in folder.glob(f"{NEW}*"):  # by processes that were killed
+            for left in folder.glob(f"{NEW}{8 * '[a-z0-9_]'}"):  # by processes that were killed
                 shutil.rmtree(left, ignore_errors=True)
             made = Path(tempfile.mkdtemp(prefix=NEW, dir=folder))
             try:
@@ -141,6 +151,14 @@ def replace_files(
     return result
 
 
+def nearest(path: Path) -> Path:
+    """The path, absolute, or what is nearest above it and exists."""
+    place = path.absolute()
+    while not os.path.lexists(place):
+        place = place.parent
+    return place
+
+
 def refuse_full_disk(path: Path, size: float, remedy: str) -> None:
     """Refuse what the disk of a path, that need not exist, has no room for, before any of it is computed.
 
@@ -153,10 +171,7 @@ def refuse_full_disk(path: Path, size: float, remedy: str) -> None:
     RequestError
         It has not.
     """
-    place = path.absolute()
-    while not place.is_dir():
-        place = place.parent
-    free = shutil.disk_usage(place).free
+    free = shutil.disk_usage(nearest(path)).free
     if not size <= free:
         raise RequestError(
             f"{path}: {size / 1e9:.3g} GB would be written, and its disk has {free / 1e9:.3g} GB free. Allowed: what "

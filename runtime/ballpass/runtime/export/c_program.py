@@ -11,14 +11,13 @@ parameters can be changed on its command line and the numbers are those of the m
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
-from ballpass.runtime.contract.folder import check_files, read_artefact
+from ballpass.runtime.contract.folder import read_artefact, read_unchanged
+from ballpass.runtime.contract.folders import read_file, replace_file
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.scene_numbers import (
     STANDALONE,
@@ -31,6 +30,7 @@ from ballpass.runtime.export.scene_numbers import (
     scene_header,
     scene_source,
 )
+from ballpass.runtime.native.compile import digests_of
 from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -55,7 +55,7 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     Parameters
     ----------
     folder : what `ballpass derive` wrote
-    out : folder to write; files of the same names are replaced, others stay
+    out : folder to write; files of an earlier export are replaced, others stay
     manifest : of the folder, where it was read before: the numbers are its own then
 
     Returns
@@ -67,19 +67,22 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     ArtefactError
         The generated folder is missing, edited or without kernels.
     RequestError
-        The model has no states, so that there is nothing to integrate, or the stepper does not take it.
+        The model has no states, so that there is nothing to integrate, or the stepper does not take it; or the folder
+        holds files of these names that are no earlier export.
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
     texts = program_texts(started(place, manifest))
-    check_files(place, manifest)  # another process may have written there meanwhile
     target.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".writing-", dir=target) as name:
-        made = Path(name)
-        for file, text in texts.items():
-            (made / file).write_text(text, encoding="utf-8", newline="\n")
-        for file in texts:
-            os.replace(made / file, target / file)
+    earlier = (target / "ballpass.h").is_file()
+    taken = [name for name in texts if (target / name).exists() and not (earlier and (target / name).is_file())]
+    if taken:
+        raise RequestError(
+            f"{target}: {', '.join(taken[:5])} would be replaced, and no exported program is there. Allowed: a folder "
+            "that is new, without files of these names, or of an earlier export. Nothing was changed. Give another one."
+        )
+    for name, text in texts.items():
+        replace_file(target / name, text.encode())
     return target
 
 
@@ -118,7 +121,7 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
     extra += [STANDALONE / "assembly.c"] if margins_of(manifest) else []
     sources = (STANDALONE / "main.c", STANDALONE / "ballpass.c", DRIVER / "schedule.c", DRIVER / "stepper.c", *extra)
     for source in sources:
-        texts.update(_with_includes(source, (STANDALONE, DRIVER, folder), texts))
+        texts.update(_with_includes(source, digests_of(folder, manifest), texts))
     objects = sorted(name for name in texts if name.endswith(".c"))
     texts["example.c"] = (STANDALONE / "example.c").read_text(encoding="utf-8")
     headers = sorted(name for name in texts if name.endswith(".h"))
@@ -127,19 +130,27 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
     return texts
 
 
-def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -> dict[str, str]:
-    """Texts of a source and of its includes from `places`; those in `known` are left out."""
-    texts = {source.name: source.read_text(encoding="utf-8")}
+def _with_includes(source: Path, generated: Mapping[Path, str], known: Iterable[str]) -> dict[str, str]:
+    """Texts of a source and of its includes; those in `known` are left out.
+
+    Parameters
+    ----------
+    generated : files of the generated folder and their sha256
+    """
+    content = read_unchanged(source, generated[source]) if source in generated else read_file(source)
+    texts = {source.name: content.decode()}
+    places = {path.name: path for path in generated}
     for name in _INCLUDE.findall(_LEFT_OUT.sub("", texts[source.name])):
-        if name in known or name in texts or (name == SWITCHES and not (places[-1] / SWITCHES).is_file()):
+        if name in known or name in texts or (name == SWITCHES and name not in places):
             continue  # a scene without kinks has no file of them, and compiles nothing that includes it
-        found = next((place / name for place in places if (place / name).is_file()), None)
+        own = next((place / name for place in (STANDALONE, DRIVER) if (place / name).is_file()), None)
+        found = own or places.get(name)
         if found is None:
             raise ArtefactError(
-                f"{source.name} includes {name}, which is neither in the driver nor in {places[-1]}. Write the folder "
+                f"{source.name} includes {name}, which is neither in the driver nor in the generated folder. Write it "
                 "again with this version's `ballpass derive`."
             )
-        texts.update(_with_includes(found, places, {*known, *texts}))
+        texts.update(_with_includes(found, generated, {*known, *texts}))
     return texts
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import html
-import os
 import platform
 import re
 import sys
@@ -28,6 +27,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import read_artefact
+from ballpass.runtime.contract.folders import replaced
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
@@ -106,12 +106,9 @@ def export_fmu(
         f"binaries/{platform_tuple()}/{identifier}{_SUFFIX}": _compiled(sources, identifier),
     }
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".writing-", dir=target.parent) as name:
-        made = Path(name) / target.name
-        with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in sorted(files):
-                archive.writestr(zipfile.ZipInfo(path, _DATE), files[path], zipfile.ZIP_DEFLATED)
-        os.replace(made, target)
+    with replaced(target) as made, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(files):
+            archive.writestr(zipfile.ZipInfo(path, _DATE), files[path], zipfile.ZIP_DEFLATED)
     return target
 
 

@@ -11,7 +11,6 @@ Zarr, for HDF5 does not survive the end of a process that writes.
 from __future__ import annotations
 
 import json
-import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,7 +22,7 @@ import numpy as np
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.folders import locked, refuse_full_disk
+from ballpass.runtime.contract.folders import LOCK, locked, refuse_full_disk
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure
@@ -33,6 +32,7 @@ from ballpass.runtime.many.data_set_store import (
     UNFINISHED,
     SignalAxes,
     SignalPlace,
+    clear_store,
     create_store,
     is_complete,
     marked,
@@ -196,7 +196,7 @@ def make_data_set(
     if netcdf and target.exists():
         return DataSetReport(path=target, members=len(table.kinds), made=0, failures=read_finished(target, spec))
     store = target.with_name(f"{target.name}.parts") if netcdf else target
-    refuse_foreign(store)
+    refuse_foreign(store, scratch=netcdf)
     axes = _axes(classes, signals, table, spec, size)
     store.mkdir(parents=True, exist_ok=True)
     with locked(store):
@@ -211,8 +211,11 @@ def make_data_set(
         failures = read_failures(group)
         if netcdf:
             write_netcdf(open_store(store), target)
+            clear_store(store)
     if netcdf:
-        shutil.rmtree(store)
+        (store / LOCK).unlink(missing_ok=True)
+        if not store.is_symlink() and not any(store.iterdir()):
+            store.rmdir()
     return DataSetReport(path=target, members=len(table.kinds), made=made, failures=failures)
 
 

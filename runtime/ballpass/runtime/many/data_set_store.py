@@ -10,6 +10,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.folders import refuse_other
+from ballpass.runtime.contract.folders import LOCK, refuse_other, replace_file, replaced
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.signals import Made
 
@@ -29,6 +30,12 @@ SCHEMA = 1
 
 #: Times of entry that an array has room for at first, and by which it grows.
 ENTRIES = 64
+
+#: Names of files in a store and its arrays; Zarr writes a file under a name that ends in partial first.
+_ENTRY = re.compile(
+    r"(\.z(group|array|attrs|metadata|metadata\.new)|\d+(\.\d+)*|\.ballpass-mark|\.ballpass\.lock)"
+    r"(\.[0-9a-f]{32}\.partial)?|\.\.zmetadata-[a-z0-9_]{8}"
+)
 
 #: Characters of a message that are kept.
 MESSAGE = 300
@@ -124,10 +131,11 @@ def is_complete(store: Path) -> bool:
 
 
 def create_store(path: Path, axes: SignalAxes) -> Any:
-    """A new store with everything but signals."""
+    """A new store with everything but signals; files of one that was begun are written anew."""
     zarr = need("zarr")
     count, size = len(axes.labels), axes.chunk
-    group = zarr.open_group(path, mode="w", zarr_format=2)
+    clear_store(path)
+    group = zarr.open_group(path, mode="a", zarr_format=2)  # "w" would delete files of others
     facts = {"title": axes.spec["title"], "ballpass_data_set": SCHEMA, "ballpass_spec": json.dumps(axes.spec)}
     group.attrs.update(facts)
 
@@ -165,7 +173,13 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
     array("failure", "member", np.full(count, "", f"<U{MESSAGE}"), "why there is no signal", chunk=size)
     array("status", "member", np.full(count, UNFINISHED, np.int8), "whether there is a signal", chunk=size)
     group["status"].attrs.update({"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)})
-    zarr.consolidate_metadata(group.store, zarr_format=2)
+    # as Zarr's consolidate_metadata, which would also read the lock
+    known = {
+        described.relative_to(path).as_posix(): json.loads(described.read_text(encoding="utf-8"))
+        for described in sorted(path.rglob(".z*"))
+        if described.name in (".zgroup", ".zattrs", ".zarray")
+    }
+    _write_summary(path, {"metadata": known, "zarr_consolidated_format": 1})
     return open_store(path)
 
 
@@ -279,9 +293,12 @@ def _note_length(store: Path, name: str) -> None:
     """Note how long an array has become where readers look first; Zarr would also read marks and locks."""
     known = json.loads((store / ".zmetadata").read_text(encoding="utf-8"))
     known["metadata"][f"{name}/.zarray"] = json.loads((store / name / ".zarray").read_text(encoding="utf-8"))
-    new = store / ".zmetadata.new"
-    new.write_text(json.dumps(known, indent=2), encoding="utf-8")
-    os.replace(new, store / ".zmetadata")
+    _write_summary(store, known)
+
+
+def _write_summary(store: Path, known: Mapping[str, Any]) -> None:
+    """Write the descriptions of all arrays where readers look first."""
+    replace_file(store / ".zmetadata", json.dumps(known, indent=2).encode())
 
 
 def _write_entries(group: Any, name: str, which: slice, times: Sequence[np.ndarray]) -> None:
@@ -311,15 +328,58 @@ def read_failures(stored: Any) -> tuple[MemberFailure, ...]:
     return tuple(found)
 
 
-def refuse_foreign(store: Path) -> None:
-    """Refuse a place that holds something else than a data set."""
-    if not store.exists():
+def refuse_foreign(store: Path, *, scratch: bool) -> None:
+    """Refuse a place that holds something else than a data set, or files of others that would be deleted with it.
+
+    Parameters
+    ----------
+    scratch : the store is deleted when all is made
+    """
+    if not os.path.lexists(store):
         return
     names = [path.name for path in store.iterdir() if not path.name.startswith(".ballpass")] if store.is_dir() else []
-    if not store.is_dir() or (names and ".zgroup" not in names):
+    if not store.is_dir() or (names and ".zgroup" not in names) or not (is_complete(store) or _is_begun(store, names)):
         raise RequestError(
             f"{store}: something else than a data set is there, and nothing was changed. Give a place that is new."
         )
+    others = _others(store) if scratch or not is_complete(store) else []
+    if others:
+        raise RequestError(
+            f"{store}: files that are no parts of a data set are there ({', '.join(others[:5])}), and nothing was "
+            "changed. Move them, or give a place that is new."
+        )
+
+
+def _is_begun(store: Path, names: Sequence[str]) -> bool:
+    """Whether a process was killed while it made this store: another store without a summary is no such one."""
+    try:
+        facts = json.loads((store / ".zattrs").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        facts = {}
+    return "ballpass_data_set" in facts or not set(names) - {".zgroup", ".zattrs"}
+
+
+def _others(store: Path) -> list[str]:
+    """Paths in a store that neither this module nor Zarr wrote; links lead to files of others."""
+    found = []
+    for path in sorted([*store.iterdir(), *store.glob("*/*")]):
+        within = path.parent != store
+        own = (_ENTRY.fullmatch(path.name) and path.is_file()) or (not within and path.is_dir())
+        if path.is_symlink() or not own:
+            found.append(str(path.relative_to(store)))
+    return found
+
+
+def clear_store(store: Path) -> None:
+    """Delete what belongs to a store, but not the lock of the process that writes there."""
+    others = set(_others(store))
+    arrays = [path for path in store.iterdir() if path.is_dir() and not path.is_symlink()]
+    for path in (path for place in (*arrays, store) for path in place.iterdir()):
+        if not path.is_dir() and path.name != LOCK and str(path.relative_to(store)) not in others:
+            path.unlink()
+    for array in arrays:
+        if not any(array.iterdir()):
+            array.rmdir()
 
 
 def refuse_changed(place: Path, facts: Mapping[str, Any], spec: Mapping[str, Any]) -> None:
@@ -366,8 +426,7 @@ def write_netcdf(group: Any, path: Path) -> None:
     import h5netcdf
     import h5py
 
-    new = path.with_name(f".{path.name}.new")
-    with h5netcdf.File(new, "w") as file:
+    with replaced(path) as new, h5netcdf.File(new, "w") as file:
         for key, fact in group.attrs.items():
             file.attrs[key] = fact
         for name, array in group.arrays():
@@ -388,4 +447,3 @@ def write_netcdf(group: Any, path: Path) -> None:
                 which = slice(first, first + array.chunks[0])
                 values = array[which]
                 variable[which] = values.astype(object) if text else values
-    os.replace(new, path)

@@ -18,6 +18,7 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import re
 import shlex
 import shutil
 import sys
@@ -29,9 +30,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
-import platformdirs
-
-from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
+from ballpass.runtime.contract.cache import CACHE_VARIABLE, CacheWarning, cache_folder, refuse_shared
+from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, CompileError, RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
 from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.folders import read_file
@@ -42,11 +42,11 @@ from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compi
 #: Name of the C source in a generated folder.
 SOURCE = "model.c"
 
-#: Environment variable that moves the cache.
-CACHE_VARIABLE = "BALLPASS_CACHE_DIR"
-
 #: Temporary files of this age were left by a process that was killed [s].
 LEFT_BEHIND = 86_400.0
+
+#: Names of these files: others' files may end alike.
+_LEFT = re.compile(r"\..+-[0-9a-f]{32}-[a-z0-9_]{8}\.tmp")
 
 #: Libraries that this process has opened, by path: they stay open, so that their functions can be had even where
 #: another program empties the cache meanwhile.
@@ -55,10 +55,6 @@ _opened: dict[Path, ctypes.CDLL] = {}
 
 class NoCompilerWarning(BallpassWarning):
     """No C compiler was found: the functions run in CasADi's virtual machine."""
-
-
-class CacheWarning(BallpassWarning):
-    """The cache cannot be written, or a library in it was damaged: libraries are compiled anew."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +100,7 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
             "Results are the same within the tolerance; a simulation takes some ten times as long, and extremes are "
             f"those of samples. {WITHOUT_COMPILER}. {INSTALL_COMPILER}.",
             NoCompilerWarning,
-            stacklevel=4,  # the caller of `load`, which is checked
+            stacklevel=5,  # the caller of `load`, which is checked
         )
         return None
     place = Path(folder).absolute()
@@ -123,7 +119,6 @@ def compile_sources(
     label: str = "model",
     headers: Sequence[Path] = (),
     made_headers: Mapping[str, str] | None = None,
-    include: Sequence[Path] = (),
     flags: tuple[str, ...] = (),
     digests: Mapping[Path, str] | None = None,
 ) -> CompiledLibrary:
@@ -136,16 +131,16 @@ def compile_sources(
     sources : C files, absolute; their order and content enter the key, their place does not
     compiler : see `find_compiler`
     label : start of the library's file name
-    headers : what the sources include, which enters the key as well; no two files of one name
+    headers : what the sources include, which enters the key as well; no two files of one name.  Nothing else is
+        found: a header that lies in a folder by chance would be executed
     made_headers : texts of further headers by name, which are part of the key as well
-    include : absolute folders in which further headers are found
     flags : further flags, behind the compiler's own
-    digests : sha256 that files must have, by path; those that are not named may have any
+    digests : sha256 that files must have, by path; in folders without one of these files they may have any
 
     Raises
     ------
     ArtefactError
-        A file has another digest: the folder was written anew since its manifest was read.
+        A file has another digest, or none: the folder was written anew since its manifest was read.
     CompileError
         The compiler failed, took too long, or a source cannot be read; with command and output.
     """
@@ -154,7 +149,7 @@ def compile_sources(
     contents |= {Path(name): text.encode() for name, text in (made_headers or {}).items()}
     key = _key(list(contents.values()), compiler)
     name = f"{_file_name(label)}-{key[:32]}"
-    ready = _find(_cache_folder(), name)
+    ready = _find(cache_folder(), name)
     if ready is not None:
         return CompiledLibrary(path=ready, key=key, compiler=compiler.identity, cached=True, seconds=0.0)
     folder = _writable_cache_folder()
@@ -166,11 +161,10 @@ def compile_sources(
         made = Path(temporary)
         _write_copies(made, contents)
         copies = tuple(str(made / path.name) for path in sources)
-        places = tuple(f"-I{path}" for path in include)
         library = made / f"library{_suffix()}"
         library.touch()
-        command = (*compiler.command, *compiler.flags, *places, *copies, "-o", str(library), "-lm")
-        shown = shlex.join((*compiler.command, *compiler.flags, *places, *map(str, sources), "-o", library.name, "-lm"))
+        command = (*compiler.command, *compiler.flags, *copies, "-o", str(library), "-lm")
+        shown = shlex.join((*compiler.command, *compiler.flags, *map(str, sources), "-o", library.name, "-lm"))
         run_compiler(command, made, shown)
         library.chmod(0o755)
         target = folder / f"{name}-{_digest(library)}{_suffix()}"
@@ -189,6 +183,8 @@ def compile_sources(
 def _content(path: Path, digests: Mapping[Path, str]) -> bytes:
     if path in digests:
         return read_unchanged(path, digests[path])
+    if any(path.parent == known.parent for known in digests):
+        raise ArtefactError(f"{path}: the manifest does not name this file. Write the folder again, into an empty one.")
     try:
         return read_file(path)
     except OSError as fault:
@@ -211,7 +207,12 @@ def _write_copies(folder: Path, contents: Mapping[Path, bytes]) -> None:
 
 def _find(folder: Path, name: str) -> Path | None:
     """The library of this name in the cache, opened; None, with a warning, where it is not what was written."""
-    for path in sorted(folder.glob(f"{name}-*{_suffix()}")):
+    try:
+        refuse_shared(folder)
+        found = sorted(folder.glob(f"{name}-*{_suffix()}"))
+    except OSError:  # `_writable_cache_folder` says why
+        found = []
+    for path in found:
         if path in _opened:  # its code is in this process, whatever has become of the file
             return path
         try:
@@ -254,7 +255,7 @@ def _digest(path: Path) -> str:
 
 def _clear(folder: Path) -> None:
     """Delete what processes that were killed while compiling left in the cache long ago."""
-    for path in folder.glob(".*.tmp"):
+    for path in filter(lambda path: _LEFT.fullmatch(path.name), folder.glob(".*.tmp")):
         with contextlib.suppress(OSError):  # gone meanwhile, or of another user
             if time.time() - path.stat().st_mtime > LEFT_BEHIND:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -283,10 +284,6 @@ def _key(contents: Sequence[bytes], compiler: Compiler) -> str:
     return digest.hexdigest()
 
 
-def _cache_folder() -> Path:
-    return Path(os.environ.get(CACHE_VARIABLE) or platformdirs.user_cache_dir("ballpass")).absolute()
-
-
 def _refuse_unreadable(folder: Path) -> None:
     """Python's ctypes loads no library from a path that is not UTF-8."""
     try:
@@ -297,10 +294,11 @@ def _refuse_unreadable(folder: Path) -> None:
 
 def _writable_cache_folder() -> Path:
     """The cache, made when missing; a folder of this process, with a warning, where the cache cannot be written."""
-    folder = _cache_folder()
+    folder = cache_folder()
     try:
         _refuse_unreadable(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        refuse_shared(folder)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as fault:

@@ -99,7 +99,6 @@ def compile_driver(folder: Path, manifest: Manifest, compiler: Compiler, driver:
         label=f"{manifest.scene}-{driver.kind}",
         headers=[*sorted(DRIVER.glob("*.h")), *(place / name for name in driver.headers)],
         made_headers={METHOD_TABLES: method_tables(), REDUCTION_TABLES: reduction_tables()},
-        include=(place, DRIVER),
         flags=(*FLAGS, *own, *driver.flags),
         digests=digests_of(place, manifest),
     )

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CalledProcessError
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import replaced
 from ballpass.runtime.plot.animation import Frames
 from ballpass.runtime.plot.bearing import LOAD_COLOURS, RING, draw_bearing
 from ballpass.runtime.plot.mechanism import BAR, MechanismView, draw_mechanism, view
@@ -44,10 +44,9 @@ def write_movie(frames: Frames, path: Path, *, progress: Callable[[float], None]
     record = frames.first
     shown = frames.samples.tolist()
     seen = view(record, shown) if record.manifest.mechanism is not None else None
-    with settings(), TemporaryDirectory(dir=path.parent) as home:
+    with settings(), replaced(path) as made:
         figure = new_figure(5.8, layout=None)
         FigureCanvasAgg(figure)  # the writers draw with the figure's canvas
-        made = Path(home) / path.name
         try:
             with writer.saving(figure, str(made), DPI):
                 for number, sample in enumerate(shown):
@@ -63,7 +62,6 @@ def write_movie(frames: Frames, path: Path, *, progress: Callable[[float], None]
                 f"The program ffmpeg ended with code {fault.returncode}: {said[-1] if said else 'no message'}. An "
                 "MP4 takes one with the encoder libx264: ffmpeg -encoders lists them. Or take --format gif or html."
             ) from None
-        made.replace(path)
     return path
 
 

@@ -6,6 +6,7 @@ Nothing here touches pyplot or leaves matplotlib's settings changed.
 
 from __future__ import annotations
 
+import io
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -22,6 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.units import printed_unit
 
 #: 1200 pixels wide.
@@ -205,9 +207,10 @@ def write(axes: Axes, at: NDArray[np.float64], words: str, **look: Any) -> None:
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a file whose kind is that of its ending, PNG, SVG or PDF, and whose bytes depend on the drawing alone."""
-    kind = path.suffix.removeprefix(".")
+    kind, drawn = path.suffix.removeprefix("."), io.BytesIO()
     with settings():
-        figure.savefig(path, format=kind, dpi=DPI, metadata=_METADATA[kind])
+        figure.savefig(drawn, format=kind, dpi=DPI, metadata=_METADATA[kind])
+    replace_file(path, drawn.getvalue())
     return path
 
 
@@ -234,6 +237,6 @@ def write_figures(
         lines += [f"![{title}]({name}.{formats[0]})", "", f"**{title}.** {caption_of(figure)}".rstrip(), ""]
     if written:
         page = folder / captions
-        page.write_text("\n".join(lines), encoding="utf-8")
+        replace_file(page, "\n".join(lines).encode())
         written.append(page)
     return written

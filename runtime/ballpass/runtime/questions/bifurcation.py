@@ -206,7 +206,7 @@ def bifurcation(
     Parameters
     ----------
     parameters : overrides, SI
-    keep : folder for what is computed, by which a call that was killed continues; deleted at the end
+    keep : folder for what is computed, by which a call that was killed continues; what it kept is deleted at the end
     progress : as for `simulate`
 
     Raises

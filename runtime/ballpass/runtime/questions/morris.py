@@ -144,7 +144,7 @@ def morris(
     Parameters
     ----------
     parameters : overrides of other parameters, SI
-    keep : folder for members that were run, by which a call that was killed continues; deleted at the end
+    keep : folder for members that were run, by which a killed call continues; what it kept is deleted at the end
     progress : as for `simulate`
 
     Raises

@@ -286,7 +286,7 @@ def sobol(
     Parameters
     ----------
     parameters : overrides of other parameters, SI
-    keep : folder for members that were run, by which a call that was killed continues; deleted at the end
+    keep : folder for members that were run, by which a killed call continues; what it kept is deleted at the end
     progress : as for `simulate`
 
     Raises

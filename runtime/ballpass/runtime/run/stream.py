@@ -10,10 +10,7 @@ one run within its tolerance.  Extremes of every step (`Solution.reductions`) ar
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import reduce
 from itertools import pairwise
@@ -23,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folders import refuse_full_disk, refuse_other
+from ballpass.runtime.contract.folders import refuse_full_disk, replaced
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
@@ -60,7 +57,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
     check_length(begin + length, turn)
     edges = _edges(model, request, path, rate, begin, begin + length, piece)
     try:
-        with _replaced(path) as made:
+        with replaced(path) as made:
             statistics = _write(model, numbers, request, made, rate, edges)
             _seal(made)
     except OSError as fault:
@@ -167,13 +164,3 @@ def _seal(path: Path) -> None:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     with path.open("ab") as stream:
         stream.write(seal(digest))
-
-
-@contextmanager
-def _replaced(path: Path) -> Iterator[Path]:
-    """A place beside a file, to be put in its place when all went well."""
-    refuse_other(path)
-    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}-") as folder:
-        made = Path(folder) / path.name
-        yield made
-        os.replace(made, path)

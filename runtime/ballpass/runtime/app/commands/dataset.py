@@ -90,12 +90,12 @@ def _signal_class(spec: ClassSpec, signals: Signals, stages: Stages) -> SignalCl
     from ballpass.derive.emit.generate import generate
     from ballpass.runtime.many.data_set import SignalClass
     from ballpass.runtime.many.signals import check_outputs
-    from ballpass.runtime.model import load
+    from ballpass.runtime.model import load_own
 
     unknown = partial(check_outputs, signals=signals, label=spec.label)
     folder = generate(spec.scene, progress=stages, inspect=unknown)
     stages("compile")
-    model = load(folder)
+    model = load_own(folder)
     if model.has_stepper:
         _ = model.stepper  # compiled here, where it is announced, and found by workers on this machine
     return SignalClass(label=spec.label, model=model, members=spec.members, parameters=spec.parameters)

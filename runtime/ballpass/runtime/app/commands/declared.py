@@ -33,6 +33,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import Question, declared, summary_of
@@ -221,7 +222,7 @@ def _ask(
             if not question.always:
                 folder.mkdir(parents=True, exist_ok=True)
                 written = [folder / f"{question.name}.json"]
-                written[0].write_text(json_text(plain), encoding="utf-8")
+                replace_file(written[0], json_text(plain).encode())
             if formats and question.figures is not None:
                 from ballpass.runtime.plot.style import write_figures
 
@@ -282,7 +283,7 @@ def _place(
         formats = ()
     if folder is None or (question.always and not formats):
         return None, ()
-    check_folder(folder)
+    check_folder(folder, f"{question.name}.json", f"{question.name}.md", *(f"*.{kind}" for kind in formats))
     return folder, formats
 
 

@@ -16,11 +16,10 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import read_asked
+from ballpass.runtime.app.commands.load_scene import generated_folder, read_asked
 from ballpass.runtime.app.commands.shared import (
     check_folder,
     command,
-    generated_folder,
     name_of,
     note,
     read_own,
@@ -81,7 +80,7 @@ def export(
                 f"the speed is {'an input' if fmu else 'a table over time'}."
             )
         else:
-            manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
+            manifest = read_own(scene, stages, lambda folder, own: read_artefact(folder, own=own), lambda found: found)
             over_time = scene.is_file() and _speed_becomes_input(manifest, chosen)
         with speed_over_time(scene, stages) if over_time else nullcontext(generated_folder(scene)) as folder:
             manifest = read_artefact(folder) if over_time else manifest

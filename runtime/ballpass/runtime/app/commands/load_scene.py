@@ -5,15 +5,20 @@ In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported i
 
 from __future__ import annotations
 
+import hashlib
 import math
+import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ballpass.runtime.contract.cache import CacheWarning, cache_folder
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.folder import read_manifest
+from ballpass.runtime.contract.folders import nearest
 from ballpass.runtime.contract.units import split_setting
 from ballpass.runtime.plot import FORMATS
 
@@ -49,6 +54,21 @@ class Asked:
     overrides: dict[str, float]
 
 
+def generated_folder(scene: Path) -> Path:
+    """The generated folder of a scene file, in the user's cache where that cannot be written; a folder itself."""
+    if scene.is_dir():
+        return scene
+    from ballpass.derive.emit.signature import folder_of
+
+    folder = folder_of(scene)
+    if os.access(nearest(folder), os.W_OK):
+        return folder
+    place = hashlib.sha256(os.fsencode(folder.absolute())).hexdigest()[:16]
+    instead = cache_folder() / "generated" / place / folder.name
+    warnings.warn(f"{folder} cannot be written: the scene is derived into {instead}.", CacheWarning, stacklevel=2)
+    return instead
+
+
 def read_asked(
     path: Path,
     settings: list[str] | None,
@@ -66,7 +86,7 @@ def read_asked(
         return asked_of(present, _overrides_of(present, settings or []))
     from ballpass.derive.emit.signature import fresh_manifest
 
-    manifest = fresh_manifest(path)
+    manifest = fresh_manifest(path, generated_folder(path))
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
         return asked_of(manifest, overrides)

@@ -141,8 +141,10 @@ def run(
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
+        from ballpass.runtime.app.results import SOLUTION, SUMMARY
         from ballpass.runtime.app.summary import add_turns
         from ballpass.runtime.app.transient_words import tables_left_out
+        from ballpass.runtime.plot import CAPTIONS
         from ballpass.runtime.run.locating import refuse_with_error
 
         stages("read")
@@ -155,8 +157,9 @@ def run(
             refuse_still(flag, integrated=asked.integrated)
         if initial == "equilibrium":
             refuse_without_bearings("--initial equilibrium", bearings=asked.bearings)
-        folder = results_folder(out, scene)
         figures = figures and can_draw()
+        names = (SOLUTION, SUMMARY, CAPTIONS, *(f"*.{kind}" for kind in formats if figures))
+        folder = results_folder(out, scene, *names)
         needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
         model = load_model(
             scene,

@@ -24,10 +24,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from ballpass.runtime.app.commands.load_scene import generated_folder
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import BallpassError, RequestError, printable
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
-from ballpass.runtime.contract.folder import read_manifest
+from ballpass.runtime.contract.folder import ForeignFolderError, read_manifest
+from ballpass.runtime.contract.folders import nearest
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.text import WIDTH
@@ -231,15 +233,6 @@ def name_of(scene: Path) -> str:
     return scene.resolve().name if scene.is_dir() else scene.stem
 
 
-def generated_folder(scene: Path) -> Path:
-    """The generated folder of a scene file; a folder itself."""
-    if scene.is_dir():
-        return scene
-    from ballpass.derive.emit.signature import folder_of
-
-    return folder_of(scene)
-
-
 def can_draw() -> bool:
     """Whether figures can be drawn; a message names the missing package where they cannot."""
     for package in ("matplotlib", "scipy"):
@@ -249,31 +242,37 @@ def can_draw() -> bool:
     return True
 
 
-def results_folder(out: Path | None, scene: Path) -> Path:
-    """Folder of a scene's results; one that cannot be written is refused."""
+def results_folder(out: Path | None, scene: Path, *names: str) -> Path:
+    """Folder of a scene's results with files of these names; one that cannot be written is refused."""
     folder = out if out is not None else Path("results") / name_of(scene)
-    check_folder(folder)
+    check_folder(folder, *names)
     return folder
 
 
 def results_file(out: Path | None, scene: Path, name: str, kinds: Sequence[str]) -> Path:
     """The file that ``--out`` names by its ending, one of `kinds`; else `name` in the folder that it names."""
     if out is not None and out.suffix.removeprefix(".") in kinds and not out.is_dir():
-        check_folder(out.parent)
+        check_folder(out.parent, out.name)
         return out
-    return results_folder(out, scene) / name
+    return results_folder(out, scene, name) / name
 
 
-def check_folder(folder: Path) -> None:
-    """Refuse a folder of results that cannot be made or written, before the simulation instead of after it."""
-    place = folder.absolute()
-    while not os.path.lexists(place):
-        place = place.parent
-    why = None
+def check_folder(folder: Path, *names: str) -> None:
+    """Refuse a folder of results that cannot be made or written, before the simulation instead of after it.
+
+    Parameters
+    ----------
+    names : of the files, or patterns of them: nothing but files may stand there
+    """
+    place, why = nearest(folder), None
     if not place.is_dir():
         why = f"{place} is not a folder"
     elif not os.access(place, os.W_OK | os.X_OK):
         why = f"{place} may not be written"
+    else:
+        taken = sorted(path for name in names for path in folder.glob(name) if path.exists() and not path.is_file())
+        if taken:
+            why = f"{taken[0]} is in the place of a file, and is none"
     if why is not None:
         raise RequestError(
             f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
@@ -284,32 +283,34 @@ def check_folder(folder: Path) -> None:
 def read_own(
     scene: Path,
     stages: Stages,
-    read: Callable[[Path], _Read],
+    read: Callable[[Path, bool], _Read],
     manifest: Callable[[_Read], Manifest],
     inspect: Callable[[Manifest], None] | None = None,
 ) -> _Read:
     """Result of `read` for the scene's folder, derived where it is stale; a generated folder is read as it is.
 
-    Scenes of one file name in different folders share a generated folder: where another process has written its own
-    scene there between writing and reading, both are done again.
+    Scenes of one file name in different folders share a generated folder: where another process, also of another user,
+    has written its own scene there between writing and reading, both are done again.
 
     Parameters
     ----------
+    read : called with the folder, and whether it must be one that this user's ballpass wrote
     manifest : function that gives the manifest of the result
     inspect : called with the manifest before C is generated, where none is before `read`; raises to refuse
     """
     if scene.is_dir():
         if inspect is not None:
             inspect(read_manifest(scene))
-        return read(scene)
+        return read(scene, False)
     from ballpass.derive.emit.generate import generate
     from ballpass.derive.emit.signature import source_key
 
     for _ in range(ATTEMPTS):
-        folder = generate(scene, progress=stages, inspect=inspect)
-        found = read(folder)
-        if manifest(found).source == source_key(scene):
-            return found
+        folder = generate(scene, generated_folder(scene), progress=stages, inspect=inspect)
+        with contextlib.suppress(ForeignFolderError):
+            found = read(folder, True)
+            if manifest(found).source == source_key(scene):
+                return found
     raise RequestError(
         f"{folder}: other processes keep writing another scene of the name {scene.stem} there. Allowed: one scene for "
         "a generated folder. Rename the scene file, or run in another folder."
@@ -337,16 +338,16 @@ def load_model(
     inspect : see `read_own`: refuses names that the model does not have
     """
     from ballpass.runtime.contract.method_registry import STEPPERS
-    from ballpass.runtime.model import load
+    from ballpass.runtime.model import load, load_own
     from ballpass.runtime.native.compilers import need_compiler
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
 
     if asked.integrated and (needs or method in STEPPERS):
         need_compiler(needs or f"method {method}")
 
-    def compiled(folder: Path) -> Model:
+    def compiled(folder: Path, own: bool) -> Model:
         stages("compile")
-        return load(folder)
+        return load_own(folder) if own else load(folder)
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
     if any(path.startswith("mechanism.") for path in asked.overrides):

@@ -145,7 +145,7 @@ def sweep(
         else:
             _, source, overrides = read_with_settings(scene, set_, *length)
         ranges = read_ranges(source, vary or [], overrides)
-        folder = results_folder(out, scene)
+        folder = results_folder(out, scene, "sweep.*", "sweep_*")
         figures, formats = figures and can_draw(), read_formats(format_)
         varied = grid(ranges)
         count = math.prod(one.count for one in ranges)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,6 +32,11 @@ if TYPE_CHECKING:
 
 #: Files of a sweep, beside a figure for each quantity.
 TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
+
+
+def _stem(quantity: str) -> str:
+    """Name of a quantity's figure, without its ending."""
+    return f"sweep_{re.sub(r'[^a-z0-9]+', '_', quantity)}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +164,11 @@ class Sweep:
             return sorted(path.name for path in made.iterdir())
 
         def owned() -> list[str]:
-            return [path.name for kind in FORMATS for path in folder.glob(f"sweep_*.{kind}")] + [CAPTIONS]
+            try:
+                before = list(json.loads((folder / REPORT).read_text(encoding="utf-8"))["quantities"])
+            except (OSError, ValueError, KeyError, TypeError):  # no sweep was here
+                return []
+            return [f"{_stem(str(name))}.{kind}" for name in before for kind in FORMATS] + [CAPTIONS]
 
         return replace_files(folder, write_all, last=REPORT, owned=owned)
 
@@ -193,7 +203,7 @@ class Sweep:
                     values,
                     text,
                 )
-                yield f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}", figure
+                yield _stem(name), figure
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
         """A number with the digits that it has."""

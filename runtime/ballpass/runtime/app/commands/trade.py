@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
+from ballpass.runtime.app.commands.load_scene import generated_folder
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -91,8 +92,8 @@ def trade(
 def _simpler(scene: Path, against: str) -> Model:
     """Model of a scene's variant, or of another scene file or generated folder."""
     from ballpass.derive import generate, read_scene
-    from ballpass.runtime.model import load
+    from ballpass.runtime.model import load, load_own
 
     if against in ("one-way", "two-way"):
-        return load(generate(read_scene(scene, coupling=cast("Coupling", against))))
-    return load(against if Path(against).is_dir() else generate(against))
+        return load_own(generate(read_scene(scene, coupling=cast("Coupling", against))))
+    return load(against) if Path(against).is_dir() else load_own(generate(against, generated_folder(Path(against))))
