@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import RequestError
-from ballpass.runtime.contract.columns import read_columns
+from ballpass.runtime.contract.column_files import read_columns
 
 TIMES, PLACES = np.array([0.0, 0.5, 1.5, 2.25]), np.array([1.5, -2.25, 3.5, 0.75])
 STYLES = {"[]": "{} [{}]", "()": "{} ({})", "_": "{}_{}", "none": "{}"}

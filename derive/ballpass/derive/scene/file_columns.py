@@ -2,7 +2,7 @@
 
 In: the parsed TOML of a scene file and its folder.  Out: the same with ``{ file = "punch.csv", column = "force",
 unit = "N" }`` in the form of a written column, ``{ values = [...], unit = "N" }``.  The unit of the file is taken where
-the scene gives none.  `ballpass.runtime.contract.columns` reads the files.
+the scene gives none.  `ballpass.runtime.contract.column_files` reads the files.
 
 Each row of a table is a parameter of the model, with a derivative of its own.  A table of more than `MOST_ROWS` rows is
 thinned: the rows that are kept are those that the straight lines between the others miss most.
@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.runtime.contract.columns import ColumnError, read_columns
+from ballpass.runtime.contract.column_files import read_columns
+from ballpass.runtime.contract.columns import ColumnError
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 
 #: Most rows: each is a parameter of the model, with a derivative of its own.

@@ -2,7 +2,7 @@
 
 In: a path or a mapping, a manifest, names of columns by output.  Out: a `Trial`, SI.
 
-`ballpass.runtime.contract.columns` reads the files.  A column ``frequency`` in place of a time makes the others
+`ballpass.runtime.contract.column_files` reads the files.  A column ``frequency`` in place of a time makes the others
 amplitudes of outputs.  Where the first column is ``quantity``, rows name quantities: ``quantity,value,deviation`` with
 units in the cells.  A line ``# PATH = VALUE``, in NetCDF an attribute, says a number of the scene in this trial alone.
 """
@@ -16,16 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract.columns import (
-    SAMPLE,
-    SEPARATORS,
-    Column,
-    ColumnFile,
-    assigned,
-    read_columns,
-    rows_of,
-    text_lines,
-)
+from ballpass.runtime.contract.column_files import SAMPLE, SEPARATORS, assigned, read_columns, rows_of, text_lines
+from ballpass.runtime.contract.columns import Column, ColumnFile
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest, VariableInfo
 from ballpass.runtime.contract.parameters import said_unit, unknown_name, wrong_unit

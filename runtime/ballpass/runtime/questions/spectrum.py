@@ -227,8 +227,8 @@ class SignalSpectrum(ShortRepr, Reported):
         )
         marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
         unit, s = "" if self.orders else " Hz", self.statistics
-        said = [*self.notes]
-        said += [f"{marks}{unit}; lines of the spectrum are {self.resolution:.3g}{unit} apart"] if marks else []
+        resolution = f"lines of the spectrum are {self.resolution:.3g}{unit} apart"
+        said = [*self.notes, *([f"{marks}{unit}; {resolution}"] if marks else [])]
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         abbreviated = bearing_words(abbreviated, self.solution.manifest.bearings)
@@ -259,6 +259,7 @@ class SignalSpectrum(ShortRepr, Reported):
             "statistics": asdict(s),
             "characteristic": [asdict(mark) for mark in self.marks],
             "lines": rows,
+            "notes": list(self.notes),
             "figure": None,  # the command puts the file here
         }
         return Report(parts=(table, *said), facts=facts, records=rows, warnings=self.warnings)
@@ -489,7 +490,7 @@ def _recorded(
 ) -> tuple[Solution, str, str, tuple[str, ...]]:
     """A recording in place of a run, its column, its unit, and words on how it was read."""
     from ballpass.runtime.ask.measured import said_numbers
-    from ballpass.runtime.contract.columns import read_columns
+    from ballpass.runtime.contract.column_files import read_columns
     from ballpass.runtime.contract.status import Status
     from ballpass.runtime.run.driver_angle import TURN, shaft_speed
     from ballpass.runtime.run.solution import Solution, Statistics

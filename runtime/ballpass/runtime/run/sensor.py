@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ballpass.runtime.contract.columns import read_columns
+from ballpass.runtime.contract.column_files import read_columns
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
