@@ -14,7 +14,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,12 @@ SAMPLE = 1000
 
 #: Separators that are tried; of equally good ones the first is taken.
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+
+#: Attributes that say what the numbers of a variable mean, and whether it is one.
+ATTRIBUTES = (
+    *("NAME", "units", "unit", "scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned"),
+    *("valid_range", "valid_min", "valid_max"),
+)
 
 #: Value that NetCDF writes where nothing was written.
 UNWRITTEN = 9.969209968386869e36
@@ -252,10 +258,12 @@ def _netcdf(path: Path, name: str) -> ColumnFile:
 
     try:
         refuse_other(path)
-        with h5py.File(path, "r") as stored:  # not h5netcdf, which looks up dimensions: those of a broken file may loop
+        with h5py.File(path, "r") as stored:  # dimensions, which h5netcdf looks up, are not needed
             items = {key: item for key, item in stored.items() if isinstance(item, h5py.Dataset) and item.ndim == 1}
             columns = [_variable(name, key, item) for key, item in items.items() if item.dtype.kind in "fiu"]
-            said = {key: str(value) for key, value in _attributes(stored).items() if isinstance(value, str)}
+            said = {
+                key: str(value) for key, value in _attributes(stored, stored.attrs).items() if isinstance(value, str)
+            }
     except RequestError:
         raise
     except Exception as error:  # h5py raises whatever a broken file leads it to
@@ -266,12 +274,14 @@ def _netcdf(path: Path, name: str) -> ColumnFile:
     return ColumnFile(name=name, columns=tuple(one for one in columns if one is not None), said=said)
 
 
-def _attributes(item: Any) -> dict[str, Any]:
-    """Attributes, those of one value as that value, texts as `str`; without those of HDF5's own types."""
+def _attributes(item: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Attributes that are there: those of one value as that value, texts as `str`."""
     found = {}
-    for key, value in item.attrs.items():
+    for key in names:
+        value = item.attrs.get(key)
         plain = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
-        found[key] = plain.decode("utf-8", "replace") if isinstance(plain, bytes) else plain
+        if plain is not None:
+            found[key] = plain.decode("utf-8", "replace") if isinstance(plain, bytes) else plain
     return found
 
 
@@ -280,7 +290,7 @@ def _variable(file: str, key: str, item: Any) -> Column | None:
 
     Source: CF conventions 1.11, sections 2.5.1, 3.1 and 8.1.
     """
-    attributes = _attributes(item)
+    attributes = _attributes(item, ATTRIBUTES)
     if str(attributes.get("NAME", "")).startswith("This is a netCDF dimension but not"):
         return None
     if item.size * item.dtype.itemsize > LARGEST:
