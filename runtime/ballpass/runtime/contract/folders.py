@@ -124,7 +124,7 @@ def replace_files(
     except OSError as fault:
         raise RequestError(
             f"{folder}: this folder cannot be made ({fault.strerror}). Allowed: one that is there, or a place where "
-            "you may make one."
+            "you may make one. Give another."
         ) from fault
     try:
         with locked(folder):
