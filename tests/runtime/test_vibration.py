@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from scipy import signal as scipy_signal
 
+from ballpass.derive import SceneError, read_scene
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, envelope, order_spectrum, spectrogram
 from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, mean_speeds, names_of
+from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
 TURN = 2.0 * np.pi
@@ -187,3 +189,7 @@ def test_lines_of_a_recording_are_named_by_the_bearings_of_the_scene(
     assert found.of == "acc"
     with pytest.raises(RequestError, match="--of"):
         rotor.spectrum(recording=tmp_path / "probe.csv", of="inner.y")
+    with pytest.raises(RequestError, match="named by a scene"):
+        spectrum(rotor.simulate(cycles=1), recording=tmp_path / "probe.csv")
+    with pytest.raises(SceneError, match="spectrum SCENE --recording FILE"):
+        read_scene(tmp_path / "probe.csv")

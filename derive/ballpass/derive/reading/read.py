@@ -65,6 +65,12 @@ RESERVED = (
 #: Turns before the steady ones of a run whose length is not given, which it drops.
 DROPPED_CYCLES = 50.0
 
+#: What to do with a measured signal in the place of a scene.
+_RECORDED = (
+    "a measured signal goes with a scene: `ballpass spectrum SCENE --recording FILE` names its lines, "
+    "`ballpass fit SCENE FILE` finds numbers"
+)
+
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
 
@@ -222,7 +228,9 @@ def _parse(text: str, source: str | None) -> dict[str, Any]:
             problem=f"this is not TOML: {message}",
             given=show(lines[line - 1].strip()) if 0 < line <= len(lines) else "",
             allowed='key = "value", [table], comments after "#"',
-            remedy="check quotes, brackets and commas in this line and in the one before it",
+            remedy=_RECORDED
+            if Path(source or "").suffix in (".csv", ".dat", ".tsv", ".txt")
+            else "check quotes, brackets and commas in this line and in the one before it",
             line=line,
         )
         raise SceneError([fault], source=source) from None
