@@ -32,6 +32,7 @@ lint: $(VENV)/.ready-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/python scripts/import_contract.py
+	$(BIN)/python scripts/code_lines.py
 	$(BIN)/ballpass derive --check scenes/punching_press.toml
 
 docs: $(VENV)/.ready-docs
