@@ -19,7 +19,6 @@ from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native import driver_library
 from ballpass.runtime.native.compilers import find_compiler
 from ballpass.runtime.native.reduction_rows import BALL_CHANNELS
-from ballpass.runtime.ratings.readings import KINDS as LIVES
 
 #: What is reduced of a channel.
 KINDS = ("max", "min", "peak_time", "min_time", "mean", "rms")
@@ -80,7 +79,7 @@ def observables(model: Model) -> list[str]:
         *(f"end:{name}" for name in states),
         *(f"{kind}:{name}" for name in (*states, *of_balls) for kind in KINDS),
         *(f"peak_ball:{name}" for name in of_balls),
-        *(bearing.prefix + life for bearing in bearings for life in LIVES),
+        *(f"{bearing.prefix}life" for bearing in bearings),
     ]
 
 

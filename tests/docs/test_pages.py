@@ -50,7 +50,7 @@ NOT_RUN = {
     r"(\.venv/bin/)?ballpass explore ": "needs ziglang; tests/runtime/test_explore.py runs it",
     r"python -m scripts\.validation\.": "tests/docs/test_validation.py runs it",
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
-    r".* --of life_sectors --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
+    r".* --of life --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
 }
 BLOCK = re.compile(r"^( *)```(console|python|toml(?=\n# \w+\.toml\n))\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 #: Columns of code that a page of 1280 pixels shows beside its contents.

@@ -17,7 +17,6 @@ from ballpass.runtime.contract.manifest import DutyInfo, LubricationInfo
 from ballpass.runtime.questions.life import life_figures
 from ballpass.runtime.ratings import groove_slip, life
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of
-from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import depth_of_pass
 
 
@@ -33,24 +32,22 @@ def test_a_report_is_what_its_quantities_give_one_by_one(press: Model) -> None:
     assert state.turns == pytest.approx(128)
     assert state.settled
     assert not report.unsettled
-    names = [f"life_{name}" for name in READINGS]
     table = {"bearing.clearance": [press.parameters["bearing.clearance"]]}
-    found = press.simulate_many(table, [*names, "max:ball.force", "peak_ball:ball.force"], cycles=130, transient=2)
-    for name in READINGS:
-        assert bearing.lives[name] == pytest.approx(float(found[f"life_{name}"][0]), rel=1e-4)
+    names = ["life", "max:ball.force", "peak_ball:ball.force"]
+    found = press.simulate_many(table, names, cycles=130, transient=2)
+    assert bearing.life == pytest.approx(float(found["life"][0]), rel=1e-4)
     assert bearing.peak_force == pytest.approx(float(found["max:ball.force"][0]), rel=1e-4)
-    assert bearing.governing == "sectors"
     # ISO 76: 4200 MPa at the ring that is worse off under C_0r
     highest = max(bearing.inner.peak_pressure, bearing.outer.peak_pressure)
     assert bearing.static_safety == pytest.approx((4.2e9 / highest) ** 3, rel=1e-9)
-    # what both raceways share is the life by sectors
+    # both raceways share the damage
     assert sum(bearing.inner.damage) + sum(bearing.outer.damage) == pytest.approx(1.0)
     # the resultant of eight balls and the load on the ring are one force, but for the ring's own inertia
     steady = press.simulate(cycles=22).steady()
     load = np.hypot(steady["reaction.A.x"], steady["reaction.A.y"]) / 2.0
     assert bearing.equivalent_load == pytest.approx(float(np.mean(load**3)) ** (1 / 3), rel=0.05)
     assert bearing.basic_life == pytest.approx(1e6 * (bearing.dynamic_rating / bearing.equivalent_load) ** 3)
-    assert bearing.hours(bearing.lives["sectors"]) == pytest.approx(bearing.lives["sectors"] / (500 * 60))
+    assert bearing.hours(bearing.life) == pytest.approx(bearing.life / (500 * 60))
     assert max(map(len, str(report).splitlines())) <= 80
     assert repr(report).startswith("LifeReport(punching_press: 242")
 
@@ -85,18 +82,18 @@ def test_states_of_a_duty_cycle_add_up_by_time(press: Model, monkeypatch: pytest
     monkeypatch.setattr(press, "manifest", replace(press.manifest, duty=states))
     (found,) = press.life(cycles=6).duty
     damage = [
-        state.share / bearing.hours(bearing.lives["sectors"]) for state, bearing in zip(states[:2], single, strict=True)
+        state.share / bearing.hours(bearing.life or 0.0) for state, bearing in zip(states[:2], single, strict=True)
     ]
-    assert found.hours["sectors"] == pytest.approx(1.0 / sum(damage), rel=1e-12)
+    assert found.hours == pytest.approx(1.0 / sum(damage), rel=1e-12)
     assert found.damage == pytest.approx({"work": damage[0] / sum(damage), "slow": damage[1] / sum(damage), "stop": 0})
     # Miner over shares of the turns says the same
     turned = [state.share * abs(bearing.speed) for state, bearing in zip(states[:2], single, strict=True)]
     shares = [each / sum(turned) for each in turned]
-    by_turns = life.miner(shares, [bearing.lives["sectors"] for bearing in single])
-    assert found.turns["sectors"] == pytest.approx(by_turns, rel=1e-12)
+    by_turns = life.miner(shares, [bearing.life for bearing in single])
+    assert found.turns == pytest.approx(by_turns, rel=1e-12)
 
 
-def test_film_and_dirt_change_the_governing_life(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_film_and_dirt_change_the_life(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     clean = press.life(cycles=6).bearings[0]
     film = LubricationInfo(viscosity_ratio=None, viscosity=30e-6, contamination=0.5)
     bearing = replace(press.manifest.bearings[0], lubrication=film)
@@ -127,8 +124,8 @@ def test_a_bearing_that_swings_has_no_life_and_the_others_have(make_model: Calla
     assert lives["big_end"] is not None
     assert "fretting" in str(report)
     rows = report.to_pandas()
-    assert np.isnan(rows.loc[("", "pin", ""), ["life", "hours"]].to_numpy(dtype=float)).all()
-    assert rows.loc[("", "main", "sectors"), "life"] == report.bearings[0].lives["sectors"]
+    assert np.isnan(rows.loc[("", "pin"), ["life", "hours"]].to_numpy(dtype=float)).all()
+    assert rows.loc[("", "main"), "life"] == report.bearings[0].life
     with pytest.raises(RequestError, match="swings"):
         model.simulate_many({"mechanism.gravity": [9.81]}, ["pin.life"], cycles=2, transient=1)
     with pytest.raises(RequestError, match="swings"):

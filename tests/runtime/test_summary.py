@@ -235,7 +235,7 @@ def test_a_quantity_that_is_no_finite_number_says_why(tmp_path: Path, monkeypatc
     assert done.exit_code == 0, done.stderr
     said = " ".join(done.stdout.split())
     assert "kurtosis (nan: the signal stands still)" in said
-    assert "shortest reading (inf: no ball carries a load)" in said
+    assert "Rating life (inf: no ball carries a load)" in said
     assert said.count("nan") == said.count("inf:") + 1 == 2
 
 

@@ -23,7 +23,7 @@ class RingStrength(ShortRepr):
     ----------
     peak_pressure : under the highest ball force [Pa]
     major_axis, minor_axis : half axes of the ellipse then, across the groove and along it [m]
-    equivalent_loads : Q_e by reading; empty where there is no life [N]
+    equivalent_load : Q_e; None where there is no life [N]
     damage : share of each place of the raceway in the damage of both, first at angle 0; empty likewise [1]
     worst_angle : place of the most damage [rad]
     wear : depth a second at the deepest place, for the least and the most of `COEFFICIENTS` [m/s]
@@ -39,7 +39,7 @@ class RingStrength(ShortRepr):
     peak_pressure: float
     major_axis: float
     minor_axis: float
-    equivalent_loads: Mapping[str, float]
+    equivalent_load: float | None
     damage: tuple[float, ...]
     worst_angle: float
     wear: tuple[float, float]
@@ -66,9 +66,9 @@ class BearingStrength(ShortRepr):
     why_no_life : reason why no standard gives a life; empty where one does
     equivalent_load : P, cubic mean of the force on the bearing [N]
     basic_life : L_10 of ISO 281 under P [turns]
-    lives : L_10r of ISO 16281 by reading [turns]; empty where there is none
+    life : L_10r of ISO 16281 [turns]; None where there is none
     viscosity_ratio, contamination : κ and e_C [1], None where the scene does not give them
-    factor, modified_life : a_ISO [1] and L_nmr [turns] of the governing reading, likewise
+    factor, modified_life : a_ISO [1] and L_nmr [turns], likewise
     beyond : limits of these numbers that it is beyond, sentences
     oscillation : where the rings swing, by hand; None where they turn, or do not move
     tilt : of the rings, by hand
@@ -76,8 +76,8 @@ class BearingStrength(ShortRepr):
     Examples
     --------
     >>> (bearing,) = model.life(cycles=4, transient=2).bearings
-    >>> bearing.governing, f"{bearing.static_safety:.1f}", sorted(bearing.lives)
-    ('sectors', '0.9', ['mean', 'miner', 'sectors'])
+    >>> f"s_0 {bearing.static_safety:.1f}, {bearing.life / 1e6:.0f} million turns"
+    's_0 0.9, 225 million turns'
     """
 
     name: str
@@ -98,7 +98,7 @@ class BearingStrength(ShortRepr):
     why_no_life: str
     equivalent_load: float
     basic_life: float | None
-    lives: Mapping[str, float]
+    life: float | None
     viscosity_ratio: float | None
     contamination: float | None
     factor: float | None
@@ -106,16 +106,6 @@ class BearingStrength(ShortRepr):
     beyond: tuple[str, ...] = ()
     oscillation: Oscillation | None = None
     tilt: Tilt | None = None
-
-    @property
-    def governing(self) -> str:
-        """The reading that gives the shortest life; empty where there is none."""
-        return min(self.lives, key=lambda name: self.lives[name]) if self.lives else ""
-
-    @property
-    def life(self) -> float | None:
-        """Life by the governing reading [turns]."""
-        return self.lives[self.governing] if self.lives else None
 
     def hours(self, turns: float) -> float:
         """Hours that so many turns take.
@@ -165,9 +155,9 @@ class DutyLife(ShortRepr):
     Attributes
     ----------
     name : of the bearing
-    hours, turns : life by reading
+    hours, turns : its life; None where there is none
     modified_hours, modified_turns : of L_nmr; None where a state has none
-    damage : share of each state, by the governing reading [1]
+    damage : share of each state [1]
     why_no_life : reason why there is none; empty where there is one
 
     Examples
@@ -182,14 +172,9 @@ class DutyLife(ShortRepr):
     """
 
     name: str
-    hours: Mapping[str, float]
-    turns: Mapping[str, float]
+    hours: float | None
+    turns: float | None
     modified_hours: float | None
     modified_turns: float | None
     damage: Mapping[str, float]
     why_no_life: str
-
-    @property
-    def governing(self) -> str:
-        """The reading that gives the shortest life; empty where there is none."""
-        return min(self.hours, key=lambda name: self.hours[name]) if self.hours else ""

@@ -33,7 +33,6 @@ from ballpass.runtime.ratings.of_bearing import (
     why_no_life,
 )
 from ballpass.runtime.ratings.oscillation import Oscillation, oscillation
-from ballpass.runtime.ratings.readings import KILO, LoadPowers, equivalent_loads, lives
 from ballpass.runtime.ratings.tilt import Tilt, free_tilt, shaft_slope
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.run import driver_angle
@@ -104,10 +103,10 @@ def _bearing(
     # of a shaft that carries the outer ring, `ring_speed` is that ring's
     sense = -moving[info.ring_speed] if info.inner_stands and not info.joint else moving[info.ring_speed]
     speed = 0.0 if why else math.copysign(history.speeds[info.prefix], sense)
-    powers = history.powers[info.prefix]
-    found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
+    powers, balls = history.powers[info.prefix], (ratings.inner_ball, ratings.outer_ball)
+    turns = None if why else float(life.raceway_life(balls, powers, ratings.life))
     load = samples.equivalent_load(float(ratings.life.basic))
-    ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
+    ratio, contamination, factor, modified = _modified(info, values, ratings, speed, turns)
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
     strength = BearingStrength(
         name=info.name,
@@ -128,7 +127,7 @@ def _bearing(
         why_no_life=why,
         equivalent_load=load,
         basic_life=None if why else _basic(ratings, load),
-        lives=found,
+        life=turns,
         viscosity_ratio=ratio,
         contamination=contamination,
         factor=factor,
@@ -204,18 +203,18 @@ def _rings(
     values: Mapping[str, float],
     ratings: Ratings,
     samples: LoadSamples,
-    powers: LoadPowers,
+    powers: NDArray[np.float64],
     force: float,
     *,
     turns: bool,
 ) -> tuple[RingStrength, RingStrength]:
     """Inner and outer ring."""
-    loads = equivalent_loads(powers, ratings.life)
+    loads = life.raceway_loads(powers, ratings.life)
     root, standing = float(1 / ratings.life.turning), float(ratings.life.standing)
-    fields = (powers.raceways[1], powers.raceways[0])
+    fields = (powers[1], powers[0])
     # (Q_e/Q_c) of a ring, to the exponent of a standing one, is the mean of this over its places
     damage = [
-        (KILO * field**root / float(rating)) ** standing
+        (life.KILO * field**root / float(rating)) ** standing
         for field, rating in zip(fields, (ratings.inner_ball, ratings.outer_ball), strict=True)
     ]
     total = float(sum(np.sum(part) for part in damage))
@@ -227,7 +226,7 @@ def _rings(
             peak_pressure=float(contact.peak_pressure(force)),
             major_axis=float(across),
             minor_axis=float(along),
-            equivalent_loads={reading: float(pair[k]) for reading, pair in loads.items()} if turns else {},
+            equivalent_load=float(loads[k]) if turns else None,
             damage=tuple((damage[k] / total).tolist()) if turns and total > 0.0 else (),
             worst_angle=driver_angle.TURN * int(np.argmax(fields[k])) / SECTORS,
             wear=(COEFFICIENTS[0] * worn, COEFFICIENTS[1] * worn),
@@ -240,11 +239,11 @@ def _rings(
 
 
 def _modified(
-    info: BearingInfo, values: Mapping[str, float], ratings: Ratings, speed: float, found: Mapping[str, float]
+    info: BearingInfo, values: Mapping[str, float], ratings: Ratings, speed: float, found: float | None
 ) -> tuple[float | None, float | None, float | None, float | None]:
-    """κ, e_C, a_ISO and L_nmr of the governing life; None where the scene gives no film."""
+    """κ, e_C, a_ISO and L_nmr; None where the scene gives no film."""
     film = info.lubrication
-    if film is None or not found:
+    if film is None or found is None:
         return None, None, None, None
     ratio, pitch = film.viscosity_ratio, values[f"{info.path}.pitch_diameter"]
     if ratio is None:  # the scene gives one of three
@@ -259,11 +258,10 @@ def _modified(
     elif film.oil_code is not None:
         contamination = contamination_of_code(film.oil_code, film.filter or "off line", ratio, pitch)
     assert contamination is not None
-    shortest = min(found.values())
-    load = life.equivalent_load(ratings.dynamic, shortest, ratings.life)
+    load = life.equivalent_load(ratings.dynamic, found, ratings.life)
     limit = contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
     factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit, ratings.life.factor))
-    return ratio, contamination, factor, float(life.modified_life(shortest, factor))
+    return ratio, contamination, factor, float(life.modified_life(found, factor))
 
 
 def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
@@ -273,7 +271,7 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
     if not lasting:
         why = turning[0][1].why_no_life if turning else "Nothing turns in any state."
         return DutyLife(
-            name=info.name, hours={}, turns={}, modified_hours=None, modified_turns=None, damage={}, why_no_life=why
+            name=info.name, hours=None, turns=None, modified_hours=None, modified_turns=None, damage={}, why_no_life=why
         )
     shares = [state.share for state, _ in lasting]
 
@@ -285,18 +283,17 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         speed = sum(share * abs(bearing.speed) for share, (_, bearing) in zip(shares, lasting, strict=True))
         return total, total * 3600.0 * speed / driver_angle.TURN
 
-    readings = lasting[0][1].lives
-    by = {name: together([bearing.lives[name] for _, bearing in lasting]) for name in readings}
-    governing = min(by, key=lambda name: by[name][0])
+    lives = [bearing.life for _, bearing in lasting if bearing.life is not None]
+    spent, turns = together(lives)
     films = [bearing.modified_life for _, bearing in lasting]
     modified = None if None in films else together([each for each in films if each is not None])
     damage = {state.name: 0.0 for state in states}
-    for state, bearing in lasting:
-        damage[state.name] = state.share * by[governing][0] / bearing.hours(bearing.lives[governing])
+    for (state, bearing), each in zip(lasting, lives, strict=True):
+        damage[state.name] = state.share * spent / bearing.hours(each)
     return DutyLife(
         name=info.name,
-        hours={name: pair[0] for name, pair in by.items()},
-        turns={name: pair[1] for name, pair in by.items()},
+        hours=spent,
+        turns=turns,
         modified_hours=None if modified is None else modified[0],
         modified_turns=None if modified is None else modified[1],
         damage=damage,

@@ -9,14 +9,10 @@ from dataclasses import asdict, dataclass
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, StateStrength
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
-from ballpass.runtime.ratings.readings import READINGS, SHORT_READINGS
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
-
-#: Behind the reading that gives the shortest life.
-GOVERNS = " (governs)"
 
 _Parts = list[Words | ReportTable]
 
@@ -71,32 +67,26 @@ class LifeReport(Reported):
     @property
     def has_lives(self) -> bool:
         """Whether the rings turn against each other, in any state."""
-        return any(bearing.lives for state in self.states for bearing in state.bearings)
+        return any(bearing.life is not None for state in self.states for bearing in state.bearings)
 
     def _report(self) -> Report:
         facts = asdict(self)
         for state, plain in zip(self.states, facts["states"], strict=True):
             for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
-                entry["governing"] = bearing.governing
-                entry["hours"] = {name: bearing.hours(life) for name, life in bearing.lives.items()}
-        for life, plain in zip(self.duty, facts["duty"], strict=True):
-            plain["governing"] = life.governing
+                entry["hours"] = None if bearing.life is None else bearing.hours(bearing.life)
         facts["wear_coefficients"] = list(COEFFICIENTS)
         records = [
             {
                 "state": state.name,
                 "bearing": bearing.name,
-                "reading": reading,
-                "life": turns,
-                "hours": bearing.hours(turns) if reading else math.nan,  # the rings may stand still
-                "governs": reading != "" and reading == bearing.governing,
+                "life": math.nan if bearing.life is None else bearing.life,
+                "hours": math.nan if bearing.life is None else bearing.hours(bearing.life),
                 "peak_force": bearing.peak_force,
                 "static_safety": bearing.static_safety,
                 "peak_pressure": max(bearing.inner.peak_pressure, bearing.outer.peak_pressure),
             }
             for state in self.states
             for bearing in state.bearings
-            for reading, turns in (bearing.lives or {"": math.nan}).items()
         ]
         swinging = [bearing.why_no_life for state in self.states for bearing in state.bearings if bearing.why_no_life]
         return Report(
@@ -106,19 +96,19 @@ class LifeReport(Reported):
             + self._meanings(),
             facts=facts,
             records=records,
-            index=("state", "bearing", "reading"),
+            index=("state", "bearing"),
             warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
         )
 
     def _meanings(self) -> _Parts:
-        """What the lives are, and the readings of the loads."""
+        """What the lives are."""
         if not self.has_lives:
             return []
         lives = "  Lives: what 90 % of such bearings reach. basic: from P alone (ISO 281); reference: from the load of "
-        lives += "every ball or roller (ISO 16281)"
+        lives += "every ball or roller at every place of both raceways (ISO 16281)"
         if any(bearing.factor is not None for state in self.states for bearing in state.bearings):
             lives += "; modified: with a factor a_ISO for oil film (viscosity ratio κ) and dirt (contamination e_C)"
-        return [f"{lives}.", *(f"  by {reading}: {words}" for reading, words in READINGS.items())]
+        return [f"{lives}."]
 
     def __repr__(self) -> str:
         parts = []
@@ -127,9 +117,9 @@ class LifeReport(Reported):
             if found.why_no_life:
                 parts.append(f"{name}no life")
             elif isinstance(found, DutyLife):
-                parts.append(f"{name}{_hours(found.hours[found.governing])} by {found.governing}")
+                parts.append(f"{name}{found.hours:.4g} h")
             else:
-                parts.append(f"{name}{_million(found.life)} by {found.governing}, s_0 {found.static_safety:.3g}")
+                parts.append(f"{name}{_million(found.life)}, s_0 {found.static_safety:.3g}")
         return f"LifeReport({self.scene}: {'; '.join(parts)})"
 
 
@@ -150,7 +140,7 @@ def _state_parts(state: StateStrength) -> _Parts:
     parts.append("")  # behind a table there is one
     for bearing in state.bearings:
         parts += _bearing_parts(bearing)
-    what = "Wear and P" if any(bearing.lives for bearing in state.bearings) else "Wear"
+    what = "Wear and P" if any(bearing.life is not None for bearing in state.bearings) else "Wear"
     return [*parts, f"  {what}: means of {state.samples} samples; angles from each ring's x axis."]
 
 
@@ -163,11 +153,9 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         ("peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
         (element.contact_words, *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
     ]
-    for reading in bearing.lives:
-        loads = (_force(ring.equivalent_loads[reading]) for ring in rings)
-        rows.append((f"equivalent {element.noun} load {_by(reading, bearing.governing)}", *loads))
-    if bearing.lives:
+    if not bearing.why_no_life:
         rows += [
+            (f"equivalent {element.noun} load", *(_force(ring.equivalent_load) for ring in rings)),
             ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
             ("share of the damage", *(f"{100.0 * sum(ring.damage):.0f} %" for ring in rings)),
         ]
@@ -200,7 +188,7 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
     lives = {
         f"basic L_10, equivalent load P {_force(bearing.equivalent_load)}": bearing.basic_life,
-        **{f"reference L_10r {_by(reading, bearing.governing)}": life for reading, life in bearing.lives.items()},
+        "reference L_10r": bearing.life,
     }
     if bearing.factor is not None:
         film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
@@ -224,19 +212,13 @@ def _verdict(bearing: BearingStrength) -> str:
 
 def _duty_parts(life: DutyLife) -> _Parts:
     head = f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"
-    if life.why_no_life:
+    if life.hours is None or life.turns is None:
         return ["", head, f"  No rating life. {life.why_no_life}"]
-    lives = {
-        f"reference L_10r {_by(name, life.governing)}": (life.turns[name], spent) for name, spent in life.hours.items()
-    }
+    lives = {"reference L_10r": (life.turns, life.hours)}
     if life.modified_hours is not None and life.modified_turns is not None:
         lives["modified L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
     return ["", head, _lives(lives), f"  Damage: {shares}."]
-
-
-def _by(reading: str, governing: str) -> str:
-    return f"by {reading}, {SHORT_READINGS[reading]}{GOVERNS if reading == governing else ''}"
 
 
 def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
@@ -256,11 +238,8 @@ def _million(turns: float | None) -> str:
     return "" if turns is None else f"{rounded(turns / MILLION)} million turns"
 
 
-def _hours(spent: float) -> str:
-    return f"{spent:.4g} h"
-
-
-def _force(value: float) -> str:
+def _force(value: float | None) -> str:
+    assert value is not None
     return f"{value:.0f} N" if value < 9999.5 else f"{value / 1e3:.4g} kN"
 
 

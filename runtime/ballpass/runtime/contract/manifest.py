@@ -286,10 +286,6 @@ class BearingInfo:
         """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""
         return f"{f'{self.beside}.' if self.beside else self.prefix}inner.{name}"
 
-    def stands_inside(self, values: Mapping[str, Any]) -> Any:
-        """Whether the inner ring makes no whole turns at these parameters and constants, numbers or arrays."""
-        return values[self.inner_turns] == 0.0 if self.inner_turns else self.inner_stands
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismInfo:

@@ -87,11 +87,11 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     b->reducing[lane] = 0.0;
     if (job->reductions != NULL && b->start[lane] >= job->reductions[m * BP_REDUCTION + BP_FROM]) {
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES], *row = job->reductions + m * BP_REDUCTION;
-        bp_channels(&n, at->t, x, row, b->balls, value, balls);
+        bp_channels(&n, at->t, x, b->balls, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
         if (!(row[BP_DURATION] > 0.0)) memcpy(row + BP_SHIFT, value, BP_LOOKED_AT * sizeof *value);
         put(b->shift, lane, row + BP_SHIFT, BP_CHANNELS);
-        if (b->powers) put_powers(b, lane, balls);
+        if (b->passes) put_powers(b, lane, balls);
         b->reducing[lane] = 1.0;
     }
 }

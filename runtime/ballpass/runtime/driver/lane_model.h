@@ -178,28 +178,17 @@ static inline __attribute__((flatten)) void bp_lane_deflections(const bp_lane_nu
 #undef BP_CHANNEL
 }
 
-/* A power of the load of a ball, added to the sum over the balls, where it is wanted; the mean, and a power of one. */
-#define BP_LANE_POWER(b, row, exponent)                                                                                          \
-    if (wanted[row] != 0.0)                                                                                                      \
-        BP_EACH_LANE power[(row) * BP_L + lane] += bp_power(load[lane], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
-#define BP_LANE_MEAN(b, row, exponent) BP_EACH_LANE power[(row) * BP_L + lane] /= BP_##b##_BALLS;
-#define BP_LANE_POWER_OF(b, row, mean, exponent)                                                                                 \
-    if (wanted[row] != 0.0)                                                                                                      \
-        BP_EACH_LANE power[(row) * BP_L + lane] = bp_power(power[(mean) * BP_L + lane], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
-
-/* Channels of the balls (see reductions.h) in lanes, at the times `time`: of each bearing quantities of the most loaded ball, then, where any
-   is wanted, powers of the loads; and then the powers of all balls that sectors add up. */
+/* Channels of the balls (see reductions.h) in lanes, at the times `time`: of each bearing quantities of the most loaded ball, and,
+   where `passes`, the powers of all balls' loads that sectors add up. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const double *restrict time, const double *restrict x,
-                                         const double *restrict all_wanted, int powers, double *restrict value, double *restrict first)
+                                         int passes, double *restrict value, double *restrict first)
 {
     double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
     bp_member_cage_lanes(time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
 #define BP_CHANNEL(b)                                                                                                            \
     {                                                                                                                            \
-        const double *wanted = all_wanted + BP_LOOKED_AT + BP_POWERS * (b);                                                      \
-        double *to = value + BP_BALL_CHANNELS * (b) * BP_L, *power = value + (BP_BALL_CHANNELS * BP_BEARINGS + BP_POWERS * (b)) * BP_L; \
-        for (int i = 0; i < BP_POWERS * BP_L; i++) power[i] = i < (BP_POWERS - 1) * BP_L ? 0.0 : 1.0;                            \
+        double *to = value + BP_BALL_CHANNELS * (b) * BP_L;                                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
             double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED, load[BP_L] BP_ALIGNED;    \
             double *own = first + (BP_##b##_FIRST_BALL + j) * BP_L;                                                              \
@@ -207,13 +196,10 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const double 
             bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                            \
             _Pragma("omp simd")                                                                                                  \
             for (int i = 0; i < BP_BALL_CHANNELS * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];               \
-            if (!powers) continue;                                                                                               \
+            if (!passes) continue;                                                                                               \
             BP_EACH_LANE load[lane] = rows[lane] > 0.0 ? 1e-3 * rows[lane] : 0.0;                                                \
             BP_EACH_LANE own[lane] = bp_power(load[lane], BP_SECTOR_POWER(b));                                                   \
-            BP_EACH_MEAN(b, BP_LANE_POWER)                                                                                       \
         }                                                                                                                        \
-        BP_EACH_MEAN(b, BP_LANE_MEAN)                                                                                            \
-        BP_EACH_POWER_OF(b, BP_LANE_POWER_OF)                                                                                    \
     }
     BP_EACH_BEARING(BP_CHANNEL)
 #undef BP_CHANNEL

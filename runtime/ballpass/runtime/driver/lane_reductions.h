@@ -51,10 +51,10 @@ static void list_wanted(bp_lane_block *b, const double *reduction)
     b->wanted = reduction;
     b->balls = balls > 0.0;
     b->guarded = b->balls && balls < 1.0;
-    b->powers = bp_wanted(reduction, BP_LOOKED_AT) > 0.0;
+    b->passes = bp_wanted(reduction, BP_LOOKED_AT) > 0.0;
     /* balls are evaluated within the step, or at the end of a part of it */
     const int all_states = b->balls && (!b->guarded || bp_parts(bp_methods[b->method].dense_degree) > 1);
-    for (int k = 0; k < BP_CHANNELS; k++) {
+    for (int k = 0; k < BP_LOOKED_AT; k++) {
         double extreme = 0.0, any = (double)all_states;
         for (int e = 0; e < BP_EXTREMES; e++) extreme += wanted[e * BP_CHANNELS + k];
         if (extreme > 0.0) b->extreme[b->extremes++] = k;
@@ -68,9 +68,8 @@ static void list_wanted(bp_lane_block *b, const double *reduction)
     }
 }
 
-/* Add a part of the steps of lanes to the powers of loads, whose means over the part are those of the channels, and to the places of the
-   raceways; see bp_add_sectors. */
-static void add_passes(const bp_job *job, bp_lane_block *b, double part, double span, const double *add, const double (*mean)[BP_L])
+/* Add a part of the steps of lanes to the angles turned and to the places of the raceways; see bp_add_sectors. */
+static void add_passes(const bp_job *job, bp_lane_block *b, double part, double span, const double *add)
 {
     double sum[BP_NB + 1][BP_L] BP_ALIGNED, moment[BP_NB + 1][BP_L] BP_ALIGNED;
     for (int j = 0; j < BP_NB; j++) {
@@ -93,10 +92,7 @@ static void add_passes(const bp_job *job, bp_lane_block *b, double part, double 
         bp_passes(b->t[lane] + part * b->h[lane], x, n.u, n.p, n.c, from);
         get(b->sampled[BP_POINTS - 1], lane, x, BP_NX);
         bp_passes(b->t[lane] + (part + span) * b->h[lane], x, n.u, n.p, n.c, to);
-        for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
-            const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            if (b->wanted[BP_WANTED_MOMENT + BP_LOOKED_AT + k] != 0.0) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += turned * mean[k][lane];
-        }
+        for (int k = 0; k < BP_BEARINGS; k++) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += bp_turned(from + 2 * k, to + 2 * k);
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
             const double total = sum[BP_##b_##_FIRST_BALL + j][lane];                                                                   \
@@ -129,7 +125,7 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         double time[BP_L] BP_ALIGNED;
         BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
         if (b->guarded) bp_lane_deflections(&b->numbers, time, y, y + BP_NX * BP_L);
-        else bp_lane_ball_channels(&b->numbers, time, y, b->wanted + BP_WANTED_MOMENT, b->powers, y + BP_NX * BP_L, b->first[q]);
+        else bp_lane_ball_channels(&b->numbers, time, y, b->passes, y + BP_NX * BP_L, b->first[q]);
     }
     /* deflections that only guard against results that mean nothing are evaluated at the ends, and between where that may be a new extreme */
     for (int k = BP_NX + BP_DEFLECTION; k < BP_LOOKED_AT && b->guarded; k += BP_BALL_CHANNELS)
@@ -139,7 +135,6 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
                 b->sampled[q][k * BP_L + lane] = start[lane] + 0.25 * q * (end[lane] - start[lane]);
             }
     double news[BP_EXTREMES][BP_LOOKED_AT][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
-    double power[BP_POWERS * BP_BEARINGS + 1][BP_L] BP_ALIGNED = {{0.0}};
     for (int i = 0; i < b->extremes; i++) {
         const int k = b->extreme[i], row = k * BP_L;
         const double *wanted = b->wanted + BP_WANTED + k;
@@ -166,8 +161,7 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
             bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);                                                                     \
             q.c0 -= shift;                                                                                                             \
             const double mean = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);                                            \
-            if (k < BP_LOOKED_AT) b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * mean : 0.0;                       \
-            else power[k - BP_LOOKED_AT][lane] = mean;                                                                                 \
+            b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * mean : 0.0;                                             \
         }                                                                                                                              \
     }
     BP_EACH_MOMENT(BP_OF_DEGREE)
@@ -187,10 +181,10 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
             }
         }
     }
-    if (b->powers) add_passes(job, b, part, span, add, (const double(*)[BP_L])power);
+    if (b->passes) add_passes(job, b, part, span, add);
     for (int lane = 0; lane < BP_L; lane++)
         if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += span * b->h[lane];
-    for (int k = 0; k < BP_CHANNELS; k++)
+    for (int k = 0; k < BP_LOOKED_AT; k++)
         BP_EACH_LANE {
             const int i = k * BP_L + lane;
             b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[BP_POINTS - 1][i] : b->sampled[0][i];

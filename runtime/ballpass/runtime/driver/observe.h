@@ -78,8 +78,8 @@ static void reduce_start(bp_run *run, double start)
     if (run->reduction == NULL) return;
     run->behind_kink = 0;
     run->reduces_balls = bp_wanted(run->reduction, BP_NX) > 0.0;
-    run->reduces_powers = bp_wanted(run->reduction, BP_LOOKED_AT) > 0.0;
-    bp_channels(&run->numbers, 0.0, run->x, run->reduction, run->reduces_balls, run->sampled[0], run->balls[0]);
+    run->reduces_passes = bp_wanted(run->reduction, BP_LOOKED_AT) > 0.0;
+    bp_channels(&run->numbers, 0.0, run->x, run->reduces_balls, run->sampled[0], run->balls[0]);
 }
 
 /* The balls at an end of the part of a step, which lies on a kink: those within the step, for the other side of a jump is not its own. */
@@ -87,7 +87,7 @@ static void reduce_beside(bp_run *run, const bp_step_taken *step, int point)
 {
     double y[BP_NX], beside[BP_CHANNELS];
     const double time = state_of_step(step, point ? 1.0 - BP_BESIDE : BP_BESIDE, y);
-    bp_channels(&run->numbers, time, y, run->reduction, 1, beside, run->balls[point]);
+    bp_channels(&run->numbers, time, y, 1, beside, run->balls[point]);
     memcpy(run->sampled[point] + BP_NX, beside + BP_NX, (BP_CHANNELS - BP_NX) * sizeof *beside);
 }
 
@@ -102,13 +102,13 @@ static int reduce_step(bp_run *run, double start, double t, double h, int cut, i
         for (int i = 1; i < BP_POINTS; i++) {
             double y[BP_NX];
             const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
-            bp_channels(&run->numbers, time, y, run->reduction, run->reduces_balls, run->sampled[i], run->balls[i]);
+            bp_channels(&run->numbers, time, y, run->reduces_balls, run->sampled[i], run->balls[i]);
         }
         if (run->reduces_balls && run->behind_kink && part == 0) reduce_beside(run, &step, 0);
         if (run->reduces_balls && cut && part == parts - 1) reduce_beside(run, &step, BP_POINTS - 1);
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
         const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};
-        bp_reduce(run->reduction, run->reduces_powers, (const double(*)[BP_CHANNELS])run->sampled, &within);
+        bp_reduce(run->reduction, run->reduces_passes, (const double(*)[BP_CHANNELS])run->sampled, &within);
         memcpy(run->balls[0], run->balls[BP_POINTS - 1], sizeof run->balls[0]);
         memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);
     }

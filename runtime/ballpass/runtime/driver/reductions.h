@@ -12,12 +12,10 @@
    methods the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
    an extrapolation across a kink.
 
-   What fatigue needs of a bearing's balls follows behind: the mean over them of the powers of their load that the rolling element's life
-   takes, of a ring that turns against the load and of one that stands, and of the latter a root that gives damage; loads in kN and nothing
-   where they pull; and one.  Only their integrals mean something.  Fatigue counts passes: these integrals are over the angle that the
-   inner ring turns against the outer one, in either sense, and that of one is this angle.  Where they are wanted, the first power is added
-   up over the places of both raceways as well: each raceway's places are hat functions, BP_SECTORS of them, in the ring's own coordinates,
-   and what a ball gives in a step acts at its centroid, so that amount and first moment are right.
+   What fatigue needs of a bearing follows behind: the angle that its inner ring turns against the outer one, in either sense, as an
+   integral, for fatigue counts passes.  Where it is wanted, the power of the balls' loads that the rolling element's life takes, loads in kN
+   and nothing where they pull, is added up over this angle at the places of both raceways: these are hat functions, BP_SECTORS of them, in
+   the ring's own coordinates, and what a ball gives in a step acts at its centroid, so that amount and first moment are right.
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
@@ -96,23 +94,9 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* Powers of the loads of bearing b from its balls' forces `of` [N], loads in kN and nothing where they pull, those that are `wanted`; behind
-   them 1.  Sums go from ball to ball, as those of lanes. */
-#define BP_MEAN_POWER(b, row, exponent)                                                                \
-    if ((wanted)[row] != 0.0) {                                                                        \
-        double term[BP_##b##_BALLS], sum = 0.0;                                                        \
-        _Pragma("omp simd")                                                                            \
-        for (int j = 0; j < BP_##b##_BALLS; j++)                                                       \
-            term[j] = bp_power(of[j] > 0.0 ? 1e-3 * of[j] : 0.0, BP_##b##_##exponent, BP_##b##_##exponent##_BY); \
-        for (int j = 0; j < BP_##b##_BALLS; j++) sum += term[j];                                       \
-        power[row] = sum / BP_##b##_BALLS;                                                             \
-    }
-#define BP_POWER_OF(b, row, mean, exponent)                                                            \
-    if ((wanted)[row] != 0.0) power[row] = bp_power(power[mean], BP_##b##_##exponent, BP_##b##_##exponent##_BY);
-
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where they are not wanted. */
-static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, const double *restrict reduction, int balls,
-                               double *restrict value, double *restrict q)
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, double *restrict value,
+                               double *restrict q)
 {
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
@@ -125,14 +109,6 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
         _Pragma("omp simd reduction(max : most)")                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
         value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
-    }                                                                                                  \
-    {                                                                                                  \
-        const double *of = q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL;                                 \
-        const double *wanted = reduction + BP_WANTED_MOMENT + BP_LOOKED_AT + BP_POWERS * (b);          \
-        double *power = value + BP_LOOKED_AT + BP_POWERS * (b);                                        \
-        BP_EACH_MEAN(b, BP_MEAN_POWER)                                                                 \
-        BP_EACH_POWER_OF(b, BP_POWER_OF)                                                               \
-        power[BP_POWERS - 1] = 1.0;                                                                    \
     }
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
@@ -160,8 +136,8 @@ static inline void bp_add_places(double *restrict sectors, double ball, double a
 /* Angle that the inner ring turns against the outer one in a step, in either sense [rad]; arguments as above. */
 static inline double bp_turned(const double *restrict from, const double *restrict to) { return fabs(to[0] - from[0] - (to[1] - from[1])); }
 
-/* Add what all balls of a bearing give, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart; the first power
-   of the loads is p/q. */
+/* Add what all balls of a bearing give, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart; the power of the
+   loads is p/q. */
 static inline __attribute__((always_inline)) void bp_add_sectors(double *restrict sectors, int balls, const int p, const int q, double turned,
                                                                  const double *restrict of, const double *restrict from,
                                                                  const double *restrict to)
@@ -492,15 +468,15 @@ BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const dou
     else bp_ball_extreme(search, u);
 }
 
-/* Add an accepted step whose channels at the quarters are v; `powers`: whether those of loads are wanted. */
-static inline void bp_reduce(double *reduction, int powers, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
+/* Add an accepted step whose channels at the quarters are v; `passes`: whether what fatigue needs is wanted. */
+static inline void bp_reduce(double *reduction, int passes, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
 {
     const double h = step->h;
     const int first = !(reduction[BP_DURATION] > 0.0);
     for (int k = 0; k < BP_LOOKED_AT && first; k++) reduction[BP_SHIFT + k] = v[0][k];
-    double moment[BP_MOMENTS][BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
+    double moment[BP_MOMENTS][BP_LOOKED_AT], top[BP_LOOKED_AT], bottom[BP_LOOKED_AT];
 #pragma omp simd
-    for (int k = 0; k < BP_CHANNELS; k++) {
+    for (int k = 0; k < BP_LOOKED_AT; k++) {
         const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k], shift = reduction[BP_SHIFT + k];
         bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);
         double low, high;
@@ -522,17 +498,14 @@ static inline void bp_reduce(double *reduction, int powers, const double v[BP_PO
                 bp_extreme(reduction, e, k, v[0] + k, BP_CHANNELS, step);
         }
     }
-    if (powers) {
+    if (passes) {
         double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
         const double *of = step->balls[0];
         for (int end = 0; end < 2; end++) {
             const double t = step->state(step->source, end, x);
             bp_passes(t, x, step->n->u, step->n->p, step->n->c, end ? to : from);
         }
-        for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
-            const double turned = bp_turned(from + 2 * (k / BP_POWERS), to + 2 * (k / BP_POWERS));
-            if (reduction[BP_WANTED_MOMENT + BP_LOOKED_AT + k] != 0.0) reduction[BP_MOMENT + BP_LOOKED_AT + k] += turned * moment[0][BP_LOOKED_AT + k];
-        }
+        for (int k = 0; k < BP_BEARINGS; k++) reduction[BP_MOMENT + BP_LOOKED_AT + k] += bp_turned(from + 2 * k, to + 2 * k);
 #define BP_ADD(b)                                                                                                                       \
     bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_SECTOR_POWER(b),                                   \
                    bp_turned(from + 2 * (b), to + 2 * (b)), of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));

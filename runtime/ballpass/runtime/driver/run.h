@@ -83,7 +83,7 @@ typedef struct {
 #endif
 #ifdef BALLPASS_REDUCTIONS
     double *reduction; /* or NULL where nothing is reduced in the present segment */
-    int reduces_balls, reduces_powers, behind_kink; /* on which the step before ended */
+    int reduces_balls, reduces_passes, behind_kink; /* on which the step before ended */
     double sampled[BP_POINTS][BP_CHANNELS], balls[BP_POINTS][BP_BALL_QUANTITIES]; /* at the quarters of a step */
 #endif
 #ifdef BALLPASS_LOCATED

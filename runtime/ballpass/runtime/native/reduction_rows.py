@@ -4,9 +4,9 @@ The tables here are the only list.  `reduction_tables` writes them as C, which i
 lanes and sectors loop over them.
 
 A row is a head and, for every channel, one number of each kind in `ROWS`.  Channels are the states, then the quantities
-of the balls of each bearing, each with its value of the most loaded ball at the moment, then the powers of each
-bearing's ball loads that fatigue needs, and one.  Of these the integrals alone mean something: over the angle that
-the inner ring turns against the outer one, for fatigue counts passes.  Behind all stand the places of the raceways.
+of the balls of each bearing, each with its value of the most loaded ball at the moment, then of each bearing the angle
+that its inner ring turns against the outer one, an integral alone.  Behind all stand the places of the raceways, with
+the power of the balls' loads that fatigue needs over this angle, for fatigue counts passes.
 """
 
 from __future__ import annotations
@@ -55,32 +55,8 @@ JUMPS = {"ball.force": True, "ball.elastic_force": False, "ball.damping_force": 
 BALL_CHANNELS = tuple(JUMPS)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoadPowerRow:
-    """A power of the loads of a bearing's balls.
-
-    Attributes
-    ----------
-    name : without the bearing's prefix
-    exponent : name of the exponent in the generated kernels
-    of : the row whose power this one is; empty for the mean over the balls of that power of their loads
-    """
-
-    name: str
-    exponent: str
-    of: str = ""
-
-
-#: Behind these for each bearing, see `LoadPowers` of the readings.
-POWERS = (
-    LoadPowerRow(name="load.turning", exponent="TURNING"),
-    LoadPowerRow(name="load.standing", exponent="STANDING"),
-    LoadPowerRow(name="load.standing_damage", exponent="DAMAGE", of="load.standing"),
-)
-
-#: One, whose integral is the angle that the inner ring turned against the outer one [rad].
+#: Angle that the inner ring turned against the outer one, behind these and the bearing's prefix [rad].
 TURNED = "load.turned"
-LOAD_POWERS = (*(power.name for power in POWERS), TURNED)
 
 #: Places of a raceway, and the power of the loads that is added up there.
 SECTORS, SECTOR_POWER = 72, "TURNING"
@@ -95,17 +71,17 @@ class ReductionRows:
 
     Attributes
     ----------
-    states, balls, powers : names of the channels: states, quantities of the balls, powers of their loads
+    states, balls, turned : names of the channels: states, quantities of the balls, angles that rings turned
     """
 
     states: tuple[str, ...]
     balls: tuple[str, ...]
-    powers: tuple[str, ...]
+    turned: tuple[str, ...]
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """All channels in the driver's order."""
-        return (*self.states, *self.balls, *self.powers)
+        return (*self.states, *self.balls, *self.turned)
 
     @cached_property
     def _columns(self) -> dict[tuple[str, str], int]:
@@ -115,14 +91,14 @@ class ReductionRows:
     @property
     def size(self) -> int:
         """Numbers of a row."""
-        return self._sectors + 2 * SECTORS * (len(self.powers) // len(LOAD_POWERS))
+        return self._sectors + 2 * SECTORS * len(self.turned)
 
     @property
     def _sectors(self) -> int:
         return len(HEAD) + len(ROWS) * len(self.channels)
 
     def raceways(self, rows: np.ndarray, prefix: str) -> np.ndarray:
-        """Integrals of the first power of the ball loads at the places of both raceways of a bearing, over its angle.
+        """Integrals of the power of the ball loads at the places of both raceways of a bearing, over its angle.
 
         Places are hat functions at equal distances, in the ring's own coordinates, from where its x axis was at the
         start.
@@ -132,7 +108,7 @@ class ReductionRows:
         numpy.ndarray
             Outer, then inner raceway, loads in kN, shape (members, 2, SECTORS).
         """
-        first = self._sectors + 2 * SECTORS * (self.powers.index(prefix + LOAD_POWERS[0]) // len(LOAD_POWERS))
+        first = self._sectors + 2 * SECTORS * self.turned.index(prefix + TURNED)
         return rows[:, first : first + 2 * SECTORS].reshape(len(rows), 2, SECTORS)
 
     def column(self, kind: str, channel: str) -> int:
@@ -158,10 +134,6 @@ class ReductionRows:
                 rows[:, self.column("max_wanted", channel)] = GUARD
         for name, channel in wanted:
             rows[:, self.column(f"{name}_wanted", channel)] = 1.0
-            for power in POWERS:  # what a power is made of is wanted with it
-                if power.of and channel.endswith(power.name):
-                    below = channel.removesuffix(power.name) + power.of
-                    rows[:, self.column(f"{name}_wanted", below)] = 1.0
         return rows
 
 
@@ -197,9 +169,6 @@ def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo,
 def reduction_tables() -> str:
     """Text of the header ``reduction_tables.h``."""
     nodes, weights = np.polynomial.legendre.leggauss(2 * max(MOMENTS.values()) + 1)
-    names = [power.name for power in POWERS]
-    means = [f"MEAN(b, {k}, {p.exponent})" for k, p in enumerate(POWERS) if not p.of]
-    powers = [f"OF(b, {k}, {names.index(p.of)}, {p.exponent})" for k, p in enumerate(POWERS) if p.of]
     looked_at = f"BP_NX + {len(BALL_CHANNELS)} * BP_BEARINGS"
     places = (f"BP_{name.upper()} = {k}" for k, name in enumerate(HEAD))
     kinds = {name: f"{len(HEAD)} + {k} * BP_CHANNELS" for k, name in enumerate(ROWS)}
@@ -212,16 +181,15 @@ def reduction_tables() -> str:
 enum {{
     BP_BALL_CHANNELS = {len(BALL_CHANNELS)},
     BP_DEFLECTION = {BALL_CHANNELS.index("ball.deflection")}, /* among them */
-    BP_POWERS = {len(LOAD_POWERS)},    /* of the loads of a bearing, the last one is 1 */
     BP_SECTORS = {SECTORS},  /* of a raceway */
     BP_EXTREMES = {len(EXTREMES)},
     BP_MOMENTS = {len(MOMENTS)},
     BP_LOOKED_AT = {looked_at}, /* channels with extremes and moments */
-    BP_CHANNELS = BP_LOOKED_AT + BP_POWERS * BP_BEARINGS
+    BP_CHANNELS = BP_LOOKED_AT + BP_BEARINGS
 }};
 
 /* Places in a row: the head, then BP_CHANNELS entries of each kind.  An extreme is a value, its time and its ball;
-   moments follow each other.  Behind them integrals of the first power of the loads: of each bearing outer, then inner
+   moments follow each other.  Behind them integrals of the power of the loads: of each bearing outer, then inner
    raceway. */
 enum {{
     {", ".join(places)},
@@ -246,9 +214,7 @@ enum {{ BP_GAUSS = {len(nodes)} }};
 static const double bp_gauss[BP_GAUSS] = {{{", ".join(repr(2.0 * float(s)) for s in nodes)}}};
 static const double bp_gauss_weight[BP_GAUSS] = {{{", ".join(repr(0.5 * float(s)) for s in weights)}}};
 
-/* Powers of the loads of bearing b: means over its balls, then powers of such means. */
-#define BP_EACH_MEAN(b, MEAN) {" ".join(means)}
-#define BP_EACH_POWER_OF(b, OF) {" ".join(powers)}
+/* Power of the loads of bearing b that damages a place, as a fraction. */
 #define BP_SECTOR_POWER(b) BP_##b##_{SECTOR_POWER}, BP_##b##_{SECTOR_POWER}_BY
 
 #endif
@@ -278,5 +244,5 @@ def _rows(states: tuple[str, ...], prefixes: tuple[str, ...]) -> ReductionRows:
     return ReductionRows(
         states=states,
         balls=tuple(prefix + name for prefix in prefixes for name in BALL_CHANNELS),
-        powers=tuple(prefix + name for prefix in prefixes for name in LOAD_POWERS),
+        turned=tuple(prefix + TURNED for prefix in prefixes),
     )

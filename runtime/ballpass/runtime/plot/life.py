@@ -6,7 +6,6 @@ In: records of `ballpass.runtime.ask`, arrays.  Out: figures.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,19 +13,12 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.life_records import BearingStrength
-from ballpass.runtime.plot.style import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.plot.sweep import LUMINANCE
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]
-
-#: Labels and lines of the readings.
-_LOOKS = {
-    "mean": FIRST | {"label": "means over time"},
-    "miner": SECOND | {"label": "damage added up (Miner)"},
-    "sectors": {"color": SAND, "linestyle": "-", "linewidth": 2.4, "label": "every place of the raceways"},
-}
 
 
 @styled
@@ -48,8 +40,7 @@ def damage(title: str, bearing: BearingStrength) -> Figure:
         f"Share of each of {len(bearing.inner.damage)} places in the damage of both raceways [%], by the power "
         f"{element.life.turning} of the {element.noun} loads that pass it, with the exponent {element.life.weibull} of "
         "Weibull's law. Angles are in each ring's own "
-        "coordinates, from where its x axis was at the start. Life by sectors: "
-        f"{bearing.lives['sectors'] / MILLION:.4g} million turns; governing reading: {bearing.governing}."
+        "coordinates, from where its x axis was at the start."
     )
     caption(figure, f"{_titled(title, bearing)}: where the raceways tire", words)
     return figure
@@ -94,17 +85,17 @@ def life_of_clearance(
     title: str,
     bearing: BearingStrength,
     clearances: Array,
-    lives: Mapping[str, Array],
+    lives: Array,
     present: float,
     group: tuple[str, float, float] | None,
     turns: float | None,
 ) -> Figure:
-    """Life by every reading against the clearance.
+    """Life against the clearance.
 
     Parameters
     ----------
     clearances : shape (points,) [m]
-    lives : by reading, shape (points,) [turns]
+    lives : shape (points,) [turns]
     present : clearance of the scene [m]
     group : name and range of the bearing's group of clearance [m]; None where the scene names none
     turns : steady turns of each point; None: as long as the scene says
@@ -114,14 +105,14 @@ def life_of_clearance(
     if group is not None:
         name, least, most = group
         panel.axvspan(1e6 * least, 1e6 * most, color=PALE, linewidth=0, zorder=0, label=f"clearance {name}")
-    for name, values in lives.items():
-        panel.plot(1e6 * clearances, values / MILLION, **_LOOKS[name])
+    panel.plot(1e6 * clearances, lives / MILLION, color=SAND, linewidth=2.4)
     panel.axvline(1e6 * present, color="#6c757d", linewidth=1.0, linestyle=":")
     panel.set(xlabel="diametral clearance in operation [µm]", ylabel="rating life $L_{10r}$ [million turns]")
     panel.margins(x=0.0)
-    panel.legend(
-        loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
-    )  # it may lie on the group
+    if group is not None:
+        panel.legend(
+            loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=1.0
+        )  # it may lie on the group
     shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""
     length = "the scene's length" if turns is None else f"{turns:.4g} steady turns"
     words = f"{len(clearances)} runs of {length}. Dotted: the scene's clearance.{shaded}"

@@ -116,45 +116,36 @@ function measured({ nodes }, measure) {
 }
 const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * value)));
 
-// Rating life of a bearing [h], the shortest of the readings of `ballpass life`, over the passes of this run; 0 where its
+// Rating life of a bearing [h], as of `ballpass life`, over the passes of this run; 0 where its
 // rings do not turn against each other.
-function lifeOf({ nodes, ratings, known }, { cage, force, life: { turning, standing, weibull, sectors, inner_stands, inner_turns } }) {
+function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors } }) {
   const seen = (node, ring) => node[seenAt + 2 * cage + ring], apart = nodes.map((node) => seen(node, 0) - seen(node, 1));
   // how far the rings turn from one node to the next; angles of cages come back after a turn
   const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
-  const fields = [0, 1].map(() => new Float64Array(sectors + 1)), sums = [0, 0, 0], last = nodes.length - 1;
+  const fields = [0, 1].map(() => new Float64Array(sectors + 1)), last = nodes.length - 1;
   let passes = 0;
   nodes.forEach((node, k) => { // trapezoids over the passes; loops without closures, for a slider that moves
     const weight = 0.5 * (Math.abs(turned[k]) + (k < last ? Math.abs(turned[k + 1]) : 0)), angles = [seen(node, 0), seen(node, 1)];
-    let one = 0, other = 0;
     passes += weight;
     for (let ball = 0; ball < force.length; ball += 1) {
       const load = node[force[ball]];
       if (!(load > 0)) continue;
       const power = turning === 3 ? load * load * load : load ** turning;
-      one += power;
-      other += power ** weibull;
       for (let ring = 0; ring < 2; ring += 1) {
         const turns = angles[ring] / TURN + ball / force.length, place = sectors * (turns - Math.floor(turns)), below = Math.min(Math.floor(place), sectors - 1);
         fields[ring][below] += weight * power * (below + 1 - place);
         fields[ring][below + 1] += weight * power * (place - below);
       }
     }
-    sums[0] += weight * one;
-    sums[1] += weight * other;
-    sums[2] += weight * (other / force.length) ** (1 / weibull) * force.length;
   });
   if (!(Math.abs(turned.reduce((sum, angle) => sum + angle)) > 0.5 * passes)) return 0;
-  const [cubic, mean, miner] = sums.map((sum, n) => (sum / (passes * force.length)) ** (1 / [turning, standing, turning][n]));
   const [onOuter, onInner] = fields.map((field) => {
     field[0] += field[sectors];
     return (field.subarray(0, sectors).reduce((sum, power) => sum + (sectors * power / (passes * force.length)) ** weibull, 0) / sectors) ** (1 / standing);
   });
-  const turns = ([first, second]) => 1e6 * ((first / ratings[2 * cage]) ** standing + (second / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
+  const turns = 1e6 * ((onInner / ratings[2 * cage]) ** standing + (onOuter / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
   const speed = passes / (nodes[last][0] - nodes[0][0]);
-  const stands = inner_turns === null ? inner_stands : known[inner_turns] === 0;
-  const readings = [[cubic, mean], [cubic, miner]].map((pair) => stands ? pair.reverse() : pair);
-  return Math.min(...[...readings, [onInner, onOuter]].map(turns)) * TURN / speed / 3600;
+  return turns * TURN / speed / 3600;
 }
 
 // Highest values of measures of a sample, between samples too: the steps do not depend on what is read.

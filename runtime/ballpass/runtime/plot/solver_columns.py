@@ -167,11 +167,11 @@ def _bearing(
         "inner": pair(bearing.inner_state("x").removesuffix(".x")),
         "outer": pair(own("outer")),
         "load": load,
-        "life": _life(bearing, place) if force.endswith("ball.force") else None,
+        "life": _life(bearing) if force.endswith("ball.force") else None,
     }
 
 
-def _life(bearing: BearingInfo, place: Mapping[str, int]) -> dict[str, float | bool | None]:
+def _life(bearing: BearingInfo) -> dict[str, float]:
     """How a life depends on the loads; see `ballpass.runtime.ratings.life.ElementLife`."""
     of = rated_element(bearing).life
     return {
@@ -179,6 +179,4 @@ def _life(bearing: BearingInfo, place: Mapping[str, int]) -> dict[str, float | b
         "standing": float(of.standing),
         "weibull": float(of.weibull),
         "sectors": SECTORS,
-        "inner_stands": bearing.inner_stands,
-        "inner_turns": place.get(bearing.inner_turns),
     }

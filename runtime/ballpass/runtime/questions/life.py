@@ -65,7 +65,7 @@ def life(
     initial: Initial = None,
     progress: Progress = None,
 ) -> LifeReport:
-    """Strength, rating life by three readings, and wear of every bearing.
+    """Strength, rating life and wear of every bearing.
 
     With a duty cycle in the scene one life over all its states, and the damage of each. Without a number of turns the
     run takes as many as lives and peaks need to settle.
@@ -85,7 +85,7 @@ def life(
     Examples
     --------
     >>> (bearing,) = model.life(cycles=4, transient=2).bearings
-    >>> f"{bearing.static_safety:.1f}, {bearing.lives['sectors'] / 1e6:.0f} million turns"
+    >>> f"{bearing.static_safety:.1f}, {bearing.life / 1e6:.0f} million turns"
     '0.9, 225 million turns'
     """
     from ballpass.runtime.ask.life_report import life_report
@@ -140,7 +140,6 @@ def _clearance(
 ) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.ratings.readings import READINGS
     from ballpass.runtime.run.driver_angle import period, whole_cycles
     from ballpass.runtime.run.settle import repeats
 
@@ -157,10 +156,9 @@ def _clearance(
     transient, values = model.run_settings.transient_cycles, model.numbers(overrides).values
     alike = repeats(model, values, transient * period(model.manifest, values))
     turns = whole_cycles(values, TURNS) if alike else None
-    asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
     cycles = None if turns is None else transient + turns
-    found = model.simulate_many(table, list(asked.values()), cycles=cycles)
+    found = model.simulate_many(table, [f"{info.prefix}life"], cycles=cycles)
     if found.interrupted:
         raise KeyboardInterrupt
-    lives = {reading: found[observable] for reading, observable in asked.items()}
+    lives = np.asarray(found[f"{info.prefix}life"])
     return figures.life_of_clearance(title, bearing, clearances, lives, present, group, turns)

@@ -17,7 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.branches import larger, smaller
 from ballpass.runtime.ratings.load_ratings import REFERENCE_GROOVES, ring_ratio
 
-MILLION = 1e6
+MILLION, KILO = 1e6, 1e3
 #: a_ISO is at most this; where its bracket is smaller, the formula has no value.
 MOST_MODIFIED = 50.0
 #: Viscosity ratios that a_ISO covers: below it is refused, above it is taken as the upper one.
@@ -244,6 +244,24 @@ def reference_life(ratings: tuple[Any, Any], equivalent_loads: tuple[Any, Any], 
     """L_10r of both rings [turns], from Q_ci, Q_ce and Q_ei, Q_ee [N]; ISO 16281:2008."""
     rings = zip(ratings, equivalent_loads, strict=True)
     return MILLION * sum((load / rating) ** float(of.standing) for rating, load in rings) ** -float(1 / of.weibull)
+
+
+def raceway_loads(powers: Any, of: ElementLife = BALLS) -> tuple[Any, Any]:
+    """Q_ei and Q_ee [N], see `sector_ball_load`.
+
+    Parameters
+    ----------
+    powers : mean powers of the loads, in kN, that pass each place of the outer, then of the inner raceway, shape
+        (..., 2, places)
+    """
+    outer, inner = (KILO * sector_ball_load(np.moveaxis(powers[..., ring, :], -1, 0), of) for ring in (0, 1))
+    return np.asarray(inner), np.asarray(outer)  # arrays: a number of Python's that is zero has no reciprocal
+
+
+def raceway_life(ratings: tuple[Any, Any], powers: Any, of: ElementLife = BALLS) -> Any:
+    """L_10r [turns] of such powers, infinite without a load; `ratings` are Q_ci and Q_ce [N]."""
+    with np.errstate(divide="ignore"):
+        return reference_life(ratings, raceway_loads(powers, of), of)
 
 
 def equivalent_load(dynamic_rating: Any, life: Any, of: ElementLife = BALLS) -> Any:

@@ -13,16 +13,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, TURNED, reduction_rows
+from ballpass.runtime.native.reduction_rows import HEAD, TURNED, reduction_rows
+from ballpass.runtime.ratings.life import raceway_life
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
-from ballpass.runtime.ratings.readings import LoadPowers, lives
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
-from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
+from ballpass.runtime.run.reductions import Reduction, raceway_powers, reduction_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, asked_transient, resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS, repeats
@@ -45,7 +46,7 @@ class LoadHistory:
     speeds : mean speed of the inner ring of each bearing against the outer one, by its prefix [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
     settled : whether that counts as none
-    powers : of the loads of each bearing, likewise
+    powers : mean powers of the loads at the places of both raceways of each bearing, see `raceway_powers`
     peaks : the highest force of any ball of each bearing, likewise
     """
 
@@ -57,7 +58,7 @@ class LoadHistory:
     speeds: Mapping[str, float]
     change: float
     settled: bool
-    powers: Mapping[str, LoadPowers]
+    powers: Mapping[str, NDArray[np.float64]]
     peaks: Mapping[str, Reduction]
 
 
@@ -107,7 +108,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
 
 def _channels(model: LoadedModel) -> list[str]:
     manifest = model.manifest
-    names = [b.prefix + name for b in manifest.bearings for name in ("ball.force", *LOAD_POWERS)]
+    names = [b.prefix + name for b in manifest.bearings for name in ("ball.force", TURNED)]
     if manifest.mechanism is not None and manifest.mechanism.rate:
         names.append(manifest.mechanism.rate)
     return names
@@ -124,14 +125,7 @@ def _history(going: ReducedRun) -> LoadHistory:
         fastest = max(rate.maximum, -rate.minimum) / abs(speed) if speed else 1.0
     powers, peaks, speeds = {}, {}, {}
     for bearing in manifest.bearings:
-        found = load_powers(manifest, bearing, going.row[None, :], going.run.numbers.values)
-        powers[bearing.prefix] = LoadPowers(
-            turning=float(found.turning[0]),
-            standing=float(found.standing[0]),
-            standing_damage=float(found.standing_damage[0]),
-            inner_stands=bearing.stands_inside(going.run.numbers.values),
-            raceways=found.raceways[0],
-        )
+        (powers[bearing.prefix],) = raceway_powers(manifest, bearing, going.row[None, :])
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
         turned = going.row[layout.column("integral", bearing.prefix + TURNED)]
         speeds[bearing.prefix] = float(turned) / duration
@@ -162,8 +156,8 @@ def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
         peak = max(peak, abs(1.0 - then / now) if now > 0.0 else 0.0)
         if not why_no_life(bearing, turning, driver_angle.shaft_speed(model.manifest, turning)):
             ratings = ratings_of(bearing, values)
-            now_by, then_by = (lives(ratings, history.powers[prefix]) for history in (found, before))
-            life = max(life, *(_moved(now_by[name], then_by[name]) for name in now_by))
+            rings = ratings.inner_ball, ratings.outer_ball
+            life = max(life, _moved(*(raceway_life(rings, h.powers[prefix], ratings.life) for h in (found, before))))
     return replace(found, change=max(life, peak), settled=life <= LIVES and peak <= PEAKS)
 
 

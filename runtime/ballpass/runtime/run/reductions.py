@@ -19,7 +19,6 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.reduction_rows import (
     BALL_CHANNELS,
     HEAD,
-    LOAD_POWERS,
     ROWS,
     SECTORS,
     TURNED,
@@ -28,7 +27,6 @@ from ballpass.runtime.native.reduction_rows import (
     reduction_rows,
     rms_of,
 )
-from ballpass.runtime.ratings.readings import LoadPowers
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
@@ -248,24 +246,15 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
     )
 
 
-def load_powers(
-    manifest: Manifest, bearing: BearingInfo, rows: np.ndarray, values: Mapping[str, float | np.ndarray]
-) -> LoadPowers:
-    """Mean powers of a bearing's ball loads over its passes from reductions, shape (members, .).
+def raceway_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> np.ndarray:
+    """Mean powers of a bearing's ball loads at the places of outer and inner raceway, over its passes, from reductions.
 
-    Parameters
-    ----------
-    values : parameters and derived constants by name, numbers or of shape (members,)
+    Returns
+    -------
+    numpy.ndarray
+        Loads in kN, shape (members, 2, SECTORS); zero where no ball passes.
     """
     layout = reduction_rows(manifest)
-    every = {name: rows[:, layout.column("integral", bearing.prefix + name)] for name in LOAD_POWERS}
-    turned = np.where(every[TURNED] > 0.0, every[TURNED], np.inf)  # no pass, no damage
-    turning, standing, damage = (every[f"load.{name}"] / turned for name in ("turning", "standing", "standing_damage"))
-    places = layout.raceways(rows, bearing.prefix) / (turned[:, None, None] * bearing.balls / SECTORS)
-    return LoadPowers(
-        turning=turning,
-        standing=standing,
-        standing_damage=damage,
-        inner_stands=bearing.stands_inside(values),
-        raceways=places,
-    )
+    turned = rows[:, layout.column("integral", bearing.prefix + TURNED), None, None]
+    passes = np.where(turned > 0.0, turned, np.inf) * bearing.balls / SECTORS  # no pass, no damage
+    return np.asarray(layout.raceways(rows, bearing.prefix) / passes)

@@ -5,23 +5,22 @@ In: the data of a run for a kind of quantity.  Out: an `Estimate` in turns of th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
-from ballpass.runtime.native.reduction_rows import LOAD_POWERS, POWERS, SECTORS, TURNED
+from ballpass.runtime.native.reduction_rows import SECTORS, TURNED
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
-from ballpass.runtime.ratings.life import ElementLife
+from ballpass.runtime.ratings.life import KILO, ElementLife, raceway_life
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
-from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
-from ballpass.runtime.ratings.readings import KINDS as READINGS_OF
 from ballpass.runtime.run.driver_angle import TURN, set_moving, shaft_speed
-from ballpass.runtime.run.reductions import load_powers
+from ballpass.runtime.run.reductions import raceway_powers
 
 Array = NDArray[np.float64]
 
@@ -40,8 +39,8 @@ RATE = np.arange(len(GAUSS)) * np.pad(_POWERS, ((0, 0), (1, 0)))[:, :-1] @ np.li
 IMAGINARY = 1e-100
 
 
-def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
-    """Life by the reading that gives the shortest one [turns], see `ballpass.runtime.ratings.readings`.
+def life(view: View, quantity: Quantity) -> Estimate:
+    """Rating life by the loads at every place of both raceways [turns].
 
     Raises
     ------
@@ -51,18 +50,16 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     _check(view.manifest, view.numbers.values, quantity)
     bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
     ratings = ratings_of(bearing, view.numbers.values)
-    passes = _over_passes(view, prefix)
-    powers, moved_powers = (
-        replace(one, inner_stands=bearing.stands_inside(view.numbers.values))
-        for one in _powers(passes, quantity, prefix, ratings.life, raceways="sectors" in readings)
-    )
-    found = lives(ratings, powers)
-    shortest = min(readings, key=lambda reading: found[reading])
-    notes = (f"of {shortest}",) if len(readings) > 1 else ()
-    value, slope = float(found[shortest]), np.zeros(view.directions)
+    powers = _powers(_over_passes(view, prefix), quantity, prefix, ratings.life)
+    value, slope = float(raceway_life(_rings(ratings), powers[0], ratings.life)), np.zeros(view.directions)
     if np.isfinite(value) and view.directions:
-        slope = np.imag(lives(_moved_ratings(view, bearing, ratings), moved_powers)[shortest]) / IMAGINARY
-    return Estimate(value=value, slope=slope, notes=notes)
+        moved = raceway_life(_moved_rings(view, bearing, ratings), _moved(powers), ratings.life)
+        slope = np.imag(moved) / IMAGINARY
+    return Estimate(value=value, slope=slope)
+
+
+def _rings(ratings: Ratings) -> tuple[Any, Any]:
+    return ratings.inner_ball, ratings.outer_ball
 
 
 def _bearing(manifest: Manifest, quantity: Quantity) -> BearingInfo:
@@ -80,19 +77,17 @@ def _moved(dual: Dual) -> NDArray[np.complex128]:
     return np.asarray(value + 1j * IMAGINARY * np.moveaxis(slope, -1, 0), dtype=complex)
 
 
-def _moved_ratings(view: View, bearing: BearingInfo, ratings: Ratings) -> Ratings:
-    """Ratings with Q_ci and Q_ce moved along the directions [N]."""
+def _moved_rings(view: View, bearing: BearingInfo, ratings: Ratings) -> tuple[Any, Any]:
+    """Q_ci and Q_ce moved along the directions [N]."""
     values = view.numbers.values
     names = [name for name in view.numbers.parameters if name.startswith(f"{bearing.path}.")]
     every = casadi.SX.sym("parameters", len(names))
     symbols = ratings_of(bearing, dict(zip(names, casadi.vertsplit(every), strict=True)))
-    each = casadi.vertcat(symbols.inner_ball, symbols.outer_ball)
+    each = casadi.vertcat(*_rings(symbols))
     slopes = casadi.Function("slopes", [every], [casadi.jacobian(each, every)])([values[name] for name in names])
     seeds = np.array([view.slopes(name) for name in names]).reshape(len(names), view.directions)
-    inner, outer = np.asarray(slopes) @ seeds
-    return replace(
-        ratings, inner_ball=_moved((ratings.inner_ball, inner)), outer_ball=_moved((ratings.outer_ball, outer))
-    )
+    inner, outer = map(_moved, zip(_rings(ratings), np.asarray(slopes) @ seeds, strict=True))
+    return inner, outer
 
 
 def _over_passes(view: View, prefix: str) -> View:
@@ -108,35 +103,14 @@ def _over_passes(view: View, prefix: str) -> View:
     return replace(view, nodes=replace(nodes, weight=weight, weight_slope=weight_slope))
 
 
-def _powers(
-    view: View, quantity: Quantity, prefix: str, of: ElementLife, *, raceways: bool
-) -> tuple[LoadPowers, LoadPowers]:
-    """Means over the passes of powers of the loads, and the same moved along the directions."""
+def _powers(view: View, quantity: Quantity, prefix: str, of: ElementLife) -> Dual:
+    """Mean powers of the loads at the places of outer and inner raceway, over the passes, and their derivatives."""
     signal = view.signals[quantity.channel]
     load = np.maximum(signal.value, 0.0) / KILO
     moved = np.where(signal.value[:, :, None] > 0.0, signal.slope, 0.0) / KILO
-
-    def over_balls(power: float) -> tuple[Array, Array]:
-        slopes = np.einsum("nb,nbd->nd", power * load ** (power - 1.0), moved)
-        return np.mean(load**power, axis=1), slopes / load.shape[1]
-
-    more, more_slope = over_balls(float(of.standing))
-    root = float(1 / of.weibull)
-    inverse = np.where(more > 0.0, more, np.inf) ** (root - 1.0)
-    duals: dict[str, Dual] = {
-        "turning": view.mean(*over_balls(float(of.turning))),
-        "standing": view.mean(more, more_slope),
-        "standing_damage": view.mean(more**root, root * inverse[:, None] * more_slope),
-    }
-    if raceways:
-        values, slopes = zip(
-            *(_raceway(view, load, moved, float(of.turning), prefix + place) for place in PLACES), strict=True
-        )
-        duals["raceways"] = np.stack(values), np.stack(slopes)
-    return (
-        LoadPowers(**{name: value for name, (value, _) in duals.items()}),
-        LoadPowers(**{name: _moved(dual) for name, dual in duals.items()}),
-    )
+    rings = [_raceway(view, load, moved, float(of.turning), prefix + place) for place in PLACES]
+    values, slopes = zip(*rings, strict=True)
+    return np.stack(values), np.stack(slopes)
 
 
 def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) -> tuple[Array, Array]:
@@ -166,38 +140,27 @@ def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) 
     return field, slope
 
 
-def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> Array:
+def _reduced(runs: ReducedRuns, quantity: Quantity) -> Array:
     bearing = _bearing(runs.manifest, quantity)
     # powers of numbers and of arrays differ in the last bit
-    values = {name: np.atleast_1d(value) for name, value in runs.values.items()}
-    found = lives(ratings_of(bearing, values), load_powers(runs.manifest, bearing, runs.rows, values))
-    return np.asarray(np.min([found[reading] for reading in readings], axis=0))
+    ratings = ratings_of(bearing, {name: np.atleast_1d(value) for name, value in runs.values.items()})
+    powers = raceway_powers(runs.manifest, bearing, runs.rows)
+    return np.asarray(raceway_life(_rings(ratings), powers, ratings.life))
 
 
-def _needs(channel: str, readings: Sequence[str]) -> tuple[str, ...]:
-    # what every place of the raceways has met needs no root of a load
-    powers = (POWERS[0].name, TURNED) if tuple(readings) == ("sectors",) else LOAD_POWERS
-    return tuple(channel.removesuffix("ball.force") + name for name in powers)
-
-
-def _kind(name: str) -> Kind:
-    readings = READINGS_OF[name]
-    reading = f"reading {readings[0]}" if len(readings) == 1 else "shortest reading"
-    which = reading if len(readings) == 1 else "by the reading that gives the shortest"
-    return Kind(
-        name=name,
-        summary=f"rating life of the bearing in turns, ISO 16281, {which}",
-        words=f"Rating life, {reading}",
+KINDS = (
+    Kind(
+        name="life",
+        summary="rating life of the bearing in turns, ISO 16281, from the loads at every place of both raceways",
+        words="Rating life",
         takes="bearing",
         unit="turns",
         check=_check,
-        evaluate=lambda view, quantity: life(view, quantity, readings),
+        evaluate=life,
         steep=True,
         beside=PLACES,
-        reduced=lambda runs, quantity: _reduced(runs, quantity, readings),
-        needs=lambda channel: _needs(channel, readings),
+        reduced=_reduced,
+        needs=lambda channel: (channel.removesuffix("ball.force") + TURNED,),
         rows=("integral",),
-    )
-
-
-KINDS = tuple(_kind(name) for name in READINGS_OF)
+    ),
+)
