@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.characteristic import CharacteristicLine, characteristic_lines, names_of, without_chance
+from ballpass.runtime.quantity.characteristic import CharacteristicLine, name_of
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.run.solution_file import load_solution
 
 DAMAGED = re.compile("BPFI|BSF|FTF")
+PUSH = """[loads.push]
+type = "harmonic"
+mean = ["0 N", "0 N"]
+amplitude = ["20 N", "0 N"]
+frequency = "247.4 Hz"
+phase = "0 deg"
+
+"""
 LONG = (
     "crank_shaper",
     "eccentric_pump",
@@ -52,29 +59,9 @@ def test_a_healthy_machine_has_no_line_of_a_damaged_bearing(make_model: Callable
         )
 
 
-def test_what_a_short_record_cannot_tell_is_said_with_the_length_that_would(make_model: Callable[..., Model]) -> None:
-    """2 BSF of the 6204 is the order 3.983532: a line of the spectrum off the fourth at 1/0.016468 = 60.7 turns."""
-    model = make_model("punching_press")
-    short = model.spectrum("inner.x", cycles=29, transient=2, orders=True)
-    fourth = short.names.index("4 shaft")
-    assert short.alternatives[fourth] == "2 BSF (61 turns)"
-    assert "2 BSF (61 turns)" in str(short)
-    long = model.spectrum("inner.x", orders=True)
-    assert long.alternatives[long.names.index("4 shaft")] == ""
-    assert long.resolution == pytest.approx(0.01)
-
-
 def test_a_line_of_a_load_with_a_frequency_of_its_own_is_no_bearings(make_model: Callable[..., Model]) -> None:
     """A load at the frequency of BPFI, and one between all lines."""
-    push = """[loads.push]
-type = "harmonic"
-mean = ["0 N", "0 N"]
-amplitude = ["20 N", "0 N"]
-frequency = "247.4 Hz"
-phase = "0 deg"
-
-"""
-    model = make_model("rotor", ("[bearing]\n", push + "[bearing]\n"), ('"load.*"]', '"load.*", "inner.*"]'))
+    model = make_model("rotor", ("[bearing]\n", PUSH + "[bearing]\n"), ('"load.*"]', '"load.*", "inner.*"]'))
     for frequency in (247.4, 333.3):
         found = model.spectrum("inner.x", parameters={"loads.push.frequency": frequency})
         nearest = np.argmin(np.abs(found.position[list(found.highest)] - frequency))
@@ -85,42 +72,23 @@ phase = "0 deg"
     assert ([mark.name for mark in turning.marks], turning.names[0]) == (["shaft"], "shaft")
 
 
-def test_sidebands_of_a_load_at_a_bearings_frequency_are_given_with_those_of_the_bearing() -> None:
-    """The shaft modulates both: a record that cannot tell load and BPFI cannot tell their sidebands."""
+def test_the_nearest_name_is_given_and_the_machine_comes_before_its_bearings() -> None:
+    """Loads mix with the shaft and with balls that pass to lines everywhere: damage beside them has no sidebands."""
     shaft, inner = 50.0, 247.4
     lines = (
         CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name=""),
-        CharacteristicLine(name="load push", bearing="", frequency=inner + 0.1, side=shaft, side_name="shaft"),
-        CharacteristicLine(name="BPFI", bearing="", frequency=inner, side=shaft, side_name="shaft"),
-    )
-    for side in (-shaft, shaft):
-        first, *others = names_of(inner + side, lines, 0.5)
-        words = f"{'-' if side < 0.0 else '+'} shaft"
-        assert (first.words, [other.words for other in others]) == (f"load push {words}", [f"BPFI {words}"])
-    apart, *others = names_of(inner + shaft, lines, 0.05)
-    assert (apart.words, others) == ("BPFI + shaft", [])
-    damage, *_ = names_of(inner, (lines[0], replace(lines[1], frequency=inner - shaft), lines[2]), 0.5)
-    assert damage.words == "BPFI"  # the simpler name, though the load has a sideband there
-
-
-def test_damage_beside_a_load_of_its_own_frequency_has_more_than_one_line() -> None:
-    """Shaft, load and ball pass mix to lines everywhere: one of them where BPFI has one is chance."""
-    shaft, inner, push = 50.0, 247.4, 67.3
-    lines = (
-        CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name=""),
-        CharacteristicLine(name="load push", bearing="", frequency=push, side=shaft, side_name="shaft"),
+        CharacteristicLine(name="load push", bearing="", frequency=67.3, side=shaft, side_name="shaft"),
         CharacteristicLine(name="BPFO", bearing="", frequency=152.6, side=shaft, side_name="shaft"),
         CharacteristicLine(name="BPFI", bearing="", frequency=inner, side=shaft, side_name="shaft"),
     )
-
-    def named(*at: float, among: tuple[CharacteristicLine, ...] = lines) -> list[str]:
-        found = without_chance([names_of(one, among, 0.5) for one in at], among)
-        return [names[0].words if names else "" for names in found]
-
-    assert named(push, shaft, inner) == ["load push", "shaft", ""]
-    assert named(push, inner, inner - shaft) == ["load push", "BPFI", "BPFI - shaft"]
-    assert named(shaft, 2 * shaft, inner, among=(lines[0], *lines[2:])) == ["shaft", "2 shaft", "BPFI"]
-    assert named(152.6 + 2 * push, 152.6, shaft) == ["BPFO + 2 load push", "BPFO", "shaft"]
+    healthy = {67.3: "load push", 2.0 * shaft: "2 shaft", 152.6 + 2 * 67.3: "BPFO + 2 load push"}
+    damage = {inner: "BPFI", inner - shaft: "", inner + 0.6: "", 3.0 * inner + 0.4: "3 BPFI"}
+    for frequency, name in (healthy | damage).items():
+        assert name_of(frequency, lines, 0.5) == name, frequency
+    alone = (lines[0], *lines[2:])
+    assert name_of(inner - shaft, alone, 0.5) == "BPFI - shaft"
+    # a record of five turns does not separate BPFI from the fifth multiple of the shaft
+    assert [name_of(at, alone, 10.0) for at in (inner, 5.0 * shaft)] == ["5 shaft", "5 shaft"]
 
 
 @pytest.mark.long
@@ -142,16 +110,14 @@ def test_healthy_bearings_under_harmonic_loads_have_no_damage(make_model: Callab
             assert not [name for name in names if DAMAGED.search(name)], (one, names)
 
 
-def test_balls_that_pass_the_load_are_named_before_damage_of_another_bearing(make_model: Callable[..., Model]) -> None:
-    """In 27 turns a line of the healthy rotor lay nearer to 2 BSF + 3 FTF of the other bearing."""
-    model = make_model("rotor_two_bearings")
-    values = model.numbers().values
-    lines = characteristic_lines(model.manifest, values)
-    of = {line.label: line.frequency for line in lines}
-    first, *_ = names_of(251.9, lines, of["shaft"] / 27)
-    assert first.words == "2 BPFO pulley - shaft"
-    damage, *_ = names_of(of["BPFI pulley"] + 0.1, lines, of["shaft"] / 27)
-    assert damage.words == "BPFI pulley"
+def test_heights_at_the_characteristic_lines_are_those_of_the_signal(make_model: Callable[..., Model]) -> None:
+    """A load of 20 N along x at 333.3 Hz, and 5 g at 20 mm that turn at 50 Hz."""
+    model = make_model("rotor", ("[bearing]\n", PUSH + "[bearing]\n"))
+    found = model.spectrum("load.x", window="flattop", parameters={"loads.push.frequency": 333.3})
+    heights = dict(zip([mark.name for mark in found.marks], found.mark_heights, strict=True))
+    assert heights["load push"] == pytest.approx(20.0, rel=1e-3)
+    assert heights["shaft"] == pytest.approx(5e-3 * 20e-3 * (100.0 * np.pi) ** 2, rel=1e-3)
+    assert "Heights at the characteristic lines" in str(found)
 
 
 def test_lines_of_the_shaft_are_at_its_frequency_and_not_a_sample_below(make_model: Callable[..., Model]) -> None:

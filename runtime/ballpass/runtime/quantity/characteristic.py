@@ -26,12 +26,6 @@ MOST_MULTIPLES, MOST_SIDED, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
 
 SIDEBANDS = range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1)
 
-#: What a step from a simple name counts, in lines of the spectrum: their positions are known to a tenth [1].
-COMPLICATED = 0.02
-
-#: Other names are given where they are hardly less simple than the first, or than this; and how many at most.
-NEARLY_AS_SIMPLE, SIMPLE, MOST_NEAR = 2, 8, 2
-
 #: Turns of a spectrum at least; its lines between ball pass and the nearest harmonic of the shaft, with room for the
 #: window's width; and the most turns that these may cost.
 TURNS, APART, MOST = 100, 5.0, 400
@@ -185,95 +179,33 @@ def mean_speeds(solution: Solution) -> Mapping[str, float]:
     return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LineName:
-    """What a line of a spectrum may be.
+def name_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> str:
+    """What a line of a spectrum is: the nearest name within the resolution; empty for none.
 
-    Attributes
-    ----------
-    words : "3 BPFO", "BPFI - shaft"
-    frequency : of that, in the unit of the lines
-    rank : how far from simple the words are
-    beside : distance from the line of the spectrum, in lines of the spectrum [1]
-    of : label of the line that it is a multiple or a sideband of
-    of_machine : whether it is the shaft or a load alone
-    healthy : whether a healthy bearing has it: balls that pass the load, or sidebands of a harmonic load
-    """
-
-    words: str
-    frequency: float
-    rank: int
-    beside: float
-    of: str
-    of_machine: bool
-    healthy: bool
-
-
-def names_of(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> tuple[LineName, ...]:
-    """What a line of a spectrum is, then as simple names that the record cannot tell from it; empty for nothing.
-
-    The nearest name wins.  A machine turns, whether or not its bearings are damaged: where the record does not tell a
-    name of a bearing from a multiple of the shaft or of a load, that wins.  So does a name of balls that pass the load,
-    or of a load with sidebands, as a healthy bearing has them, against one of damage that is not simpler.  Loads of
-    frequencies of their own are sidebands of all these, and mix so much that damage has simple names only.
+    A machine turns, whether or not its bearings are damaged: a multiple of the shaft or of a load that the record does
+    not separate from a name of a bearing comes first.  Positions are known to a tenth of a line; of names as near, that
+    with fewer sidebands and the lower multiple is given.  Loads of frequencies of their own are sidebands of balls that
+    pass and of each other, and mix so much that damage beside them has no sidebands.
 
     Parameters
     ----------
     frequency : of the line
-    resolution : distance of two lines of the spectrum: largest distance of a name from the line
+    resolution : distance of two lines of the spectrum
     """
-    fits: list[LineName] = []
+    fits: list[tuple[bool, float, int, Fraction, str]] = []
     loads = [line for line in lines if line.is_load]
     for line in lines:
         if line.frequency == 0.0:
             continue
-        sides = [(m, line.side, line.side_name) for m in SIDEBANDS if m and line.side]
-        if line.healthy and line.side:
-            sides += [(m, one.frequency, one.label) for one in loads if one is not line for m in SIDEBANDS if m]
-        for m, side, name in ((0, 0.0, ""), *sides):
+        sides = [(line.side, line.side_name)] if line.side and (line.healthy or not loads) else []
+        sides += [(one.frequency, one.label) for one in loads if line.healthy and line.side and one is not line]
+        for m, (side, name) in ((0, (0.0, "")), *((m, of) for of in sides for m in SIDEBANDS if m)):
             most = MOST_OF_CAGE if line.name == "FTF" else MOST_SIDED if m else MOST_MULTIPLES
             k = Fraction(round((frequency - m * side) / line.frequency * line.parts), line.parts)
-            found = float(k) * line.frequency + m * side
-            beside, rank = abs(frequency - found) / resolution, math.ceil(k) + 3 * abs(m)
-            if loads and not line.healthy and rank > SIMPLE:
-                continue
-            if k > 0 and (k <= most or line.name == "shaft") and beside <= 1.0 + 1e-9:
-                fits.append(
-                    LineName(
-                        words=_words(k, m, line, name),
-                        frequency=found,
-                        rank=rank,
-                        beside=beside,
-                        of=line.label,
-                        of_machine=m == 0 and not line.of_bearing,
-                        healthy=line.healthy,
-                    )
-                )
-    if not fits:
-        return ()
-    fits.sort(key=lambda name: (not name.of_machine, name.beside + COMPLICATED * name.rank, name.words))
-    healthy = [name for name in fits if name.healthy and name.rank <= fits[0].rank]
-    first = healthy[0] if healthy and not fits[0].healthy else fits[0]
-    others = [name for name in fits if name is not first]
-    simple = min(first.rank, SIMPLE) + NEARLY_AS_SIMPLE
-    near = [name for name in others if not name.of_machine and name.rank <= simple]
-    return (first, *near[:MOST_NEAR])
-
-
-def without_chance(
-    found: Sequence[tuple[LineName, ...]], lines: Sequence[CharacteristicLine]
-) -> list[tuple[LineName, ...]]:
-    """Names of the highest lines of a spectrum, without damage that only one of several has.
-
-    Loads of frequencies of their own mix with the shaft and with ball pass to so many lines that some are by chance
-    where damage has one; damage has several.
-    """
-    if len(found) <= 2 or not any(line.is_load for line in lines):
-        return list(found)
-    families = [names[0].of for names in found if names]
-    return [
-        tuple(name for name in names if name.healthy or families.count(name.of) > 1) if names else () for names in found
-    ]
+            apart = abs(frequency - float(k) * line.frequency - m * side) / resolution
+            if k > 0 and (k <= most or line.name == "shaft") and apart <= 1.0 + 1e-9:
+                fits.append((m != 0 or line.of_bearing, round(apart, 1), abs(m), k, _words(k, m, line, name)))
+    return min(fits)[-1] if fits else ""
 
 
 def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.vibration import DiagnosisStatistics
     from ballpass.runtime.contract.manifest import Manifest
-    from ballpass.runtime.quantity.characteristic import CharacteristicLine, LineName
+    from ballpass.runtime.quantity.characteristic import CharacteristicLine
     from ballpass.runtime.run.solution import Solution
 
 #: Bands of a kurtogram are so many times as wide as the fastest line at least: impacts stay apart in them.
@@ -173,26 +173,15 @@ class SignalSpectrum(ShortRepr, Reported):
     @property
     def names(self) -> tuple[str, ...]:
         """What the highest lines are: "BPFO", "2 shaft"; empty for what is none."""
-        return tuple(found[0].words if found else "" for found in self._found)
+        from ballpass.runtime.quantity.characteristic import name_of
+
+        return tuple(name_of(self._top(k), self.marks, self.resolution) for k in self.highest)
 
     @property
-    def alternatives(self) -> tuple[str, ...]:
-        """Other names that this record cannot tell from these, with the turns that would: "2 BSF (61 turns)"."""
-        turn = next((mark.frequency for mark in self.marks if mark.name == "shaft"), 1.0)
-
-        def words(first: LineName, other: LineName) -> str:
-            apart = abs(first.frequency - other.frequency)
-            length = f"{math.ceil(turn / apart)} turns" if apart > 1e-9 * turn else "the same frequency"
-            return f"{other.words} ({length})"
-
-        return tuple(", ".join(words(found[0], other) for other in found[1:]) for found in self._found)
-
-    @property
-    def _found(self) -> list[tuple[LineName, ...]]:
-        from ballpass.runtime.quantity.characteristic import names_of, without_chance
-
-        found = [names_of(self._top(k), self.marks, self.resolution) for k in self.highest]
-        return without_chance(found, self.marks)
+    def mark_heights(self) -> tuple[float, ...]:
+        """Height at each characteristic frequency, of the nearest line; nan above the last one [`height_unit`]."""
+        places = (round(mark.frequency / self.resolution) for mark in self.marks)
+        return tuple(float(self.height[k]) if k < len(self.height) else math.nan for k in places)
 
     def _top(self, k: int) -> float:
         """Position of a local maximum: that of the parabola through the logarithms of three lines."""
@@ -206,29 +195,34 @@ class SignalSpectrum(ShortRepr, Reported):
                 "order" if self.orders else "frequency": float(self.position[k]),
                 self.scaling: float(self.height[k]),
                 "line": name,
-                "alternatives": others,
             }
-            for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
+            for k, name in zip(self.highest, self.names, strict=True)
         ]
         across = "order" if self.orders else "frequency [Hz]"
-        columns = 4 if any(self.alternatives) else 3
         infos = (*self.solution.manifest.states, *self.solution.manifest.outputs)
         words = next((info.description for info in infos if info.name == self.of), "")
         factor, height_unit = table_unit(self.height_unit)
         height = f"{self.scaling} [{height_unit}]"
         table = ReportTable(
             title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
-            heads=(across, height, "line", "or (separated by)")[:columns],
+            heads=(across, height, "line"),
             rows=[
-                (f"{self.position[k]:.6g}", f"{factor * self.height[k]:.4g}", name, others)[:columns]
-                for k, name, others in zip(self.highest, self.names, self.alternatives, strict=True)
+                (f"{self.position[k]:.6g}", f"{factor * self.height[k]:.4g}", name)
+                for k, name in zip(self.highest, self.names, strict=True)
             ],
             right=(across, height),
         )
-        marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
-        unit, s = "" if self.orders else " Hz", self.statistics
-        resolution = f"lines of the spectrum are {self.resolution:.3g}{unit} apart"
-        said = [*self.notes, *([f"{marks}{unit}; {resolution}"] if marks else [])]
+        at_marks = ReportTable(
+            title="Heights at the characteristic lines",
+            heads=(across, height, "line"),
+            rows=[
+                (f"{mark.frequency:.6g}", "" if math.isnan(own) else f"{factor * own:.4g}", mark.label)
+                for mark, own in zip(self.marks, self.mark_heights, strict=True)
+            ],
+            right=(across, height),
+        )
+        s = self.statistics
+        said = [f"lines of the spectrum are {self.resolution:.3g}{'' if self.orders else ' Hz'} apart", *self.notes]
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         abbreviated = bearing_words(abbreviated, self.solution.manifest.bearings)
@@ -257,12 +251,16 @@ class SignalSpectrum(ShortRepr, Reported):
             "kurtosis": self.kurtosis,
             "resolution": self.resolution,
             "statistics": asdict(s),
-            "characteristic": [asdict(mark) for mark in self.marks],
+            "characteristic": [
+                asdict(mark) | {self.scaling: own} for mark, own in zip(self.marks, self.mark_heights, strict=True)
+            ],
             "lines": rows,
             "notes": list(self.notes),
             "figure": None,  # the command puts the file here
         }
-        return Report(parts=(table, *said), facts=facts, records=rows, warnings=self.warnings)
+        return Report(
+            parts=(table, *([at_marks] if self.marks else []), *said), facts=facts, records=rows, warnings=self.warnings
+        )
 
 
 def _lowest_reading(window: str) -> float:
