@@ -10,9 +10,8 @@ one run within its tolerance.  Extremes of every step (`Solution.reductions`) ar
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import replace
-from functools import reduce
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -89,27 +88,22 @@ def _write(
 ) -> Statistics:
     import h5netcdf
 
-    count, done = edges[-1] - edges[0], 0
+    count, start, tell = edges[-1] - edges[0], request.initial, request.progress
     parts: list[Statistics] = []
+    piece = replace(request, cycles=None, duration=None, sample_rate=None)
     with h5netcdf.File(path, "w") as file:
-        start = request.initial
         for first, behind in pairwise(edges):
             times = np.maximum(np.arange(first, behind) / rate, start_time(start))
-            one = replace(
-                request,
-                cycles=None,
-                duration=None,
-                sample_rate=None,
-                times=times,
-                initial=start,
-                progress=_part(request.progress, done / count, (behind - first) / count),
-            )
-            solution = simulate(model, numbers, one)
+            at, share = (first - edges[0]) / count, (behind - first) / count
+            shown = tell and partial(lambda at, share, fraction: tell(at + share * fraction), at, share)
+            solution = simulate(model, numbers, replace(piece, times=times, initial=start, progress=shown))
             start = solution.end
-            _append(file, solution, done)
+            _append(file, solution, first - edges[0])
             parts.append(solution.statistics)
-            done += behind - first
-        total = reduce(_added, parts)
+        counts = ("steps", "rejected", "located", "segments", "calls", "wall_time", "duration")
+        each = {name: [getattr(part, name) for part in parts] for name in counts}
+        sums: dict[str, Any] = {name: None if None in found else sum(found) for name, found in each.items()}
+        total = replace(parts[0], **sums)
         whole = replace(solution, statistics=total, reductions=None, steady_reductions=None)
         for key, fact in contents(whole)[1].items():
             file.attrs[key] = fact
@@ -137,25 +131,6 @@ def _append(file: Any, solution: Solution, done: int) -> None:
         if dimensions[0] == "time":
             file.variables[name][done : done + rows] = values
     file.flush()
-
-
-def _added(before: Statistics, now: Statistics) -> Statistics:
-    """Statistics of two pieces that follow each other."""
-
-    def both(name: str) -> Any:
-        a, b = getattr(before, name), getattr(now, name)
-        return None if a is None or b is None else a + b
-
-    counts = ("steps", "rejected", "located", "segments", "calls", "wall_time", "duration")
-    return replace(before, **{name: both(name) for name in counts})
-
-
-def _part(progress: Callable[[float], None] | None, done: float, share: float) -> Callable[[float], None] | None:
-    """Progress of a piece as that of the whole run."""
-    if progress is None:
-        return None
-    tell = progress
-    return lambda fraction: tell(done + share * fraction)
 
 
 def _seal(path: Path) -> None:
