@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -66,8 +65,6 @@ def stepper_run(model: LoadedModel, numbers: Numbers, request: Request) -> Run:
 def compared_quantities(model: LoadedModel, of: str | Sequence[str] | None) -> tuple[Quantity, ...]:
     """Quantities whose errors are asked for; by default peak ball force, rms and range of the inner ring's motion."""
     names = default_compared(model.manifest) if of is None else (of,) if isinstance(of, str) else tuple(of)
-    if not names:
-        raise RequestError("of: at least one quantity is expected. Example: peak_ball_force.")
     return quantities_of(model, names)
 
 

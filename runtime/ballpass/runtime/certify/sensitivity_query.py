@@ -35,7 +35,7 @@ from ballpass.runtime.certify.sensitivity_report import (
     SensitivityReport,
     ratio_unit,
 )
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, TOLERANCES
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -49,7 +49,7 @@ from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
-from ballpass.runtime.run.request import Request, asked_length
+from ballpass.runtime.run.request import Request, asked_length, tolerance
 from ballpass.runtime.run.resolve import Run, asked_transient
 
 Array = NDArray[np.float64]
@@ -130,10 +130,8 @@ def make_query(
         A wrong request.
     """
     for name, given in (("rtol", rtol), ("sensitivity_rtol", sensitivity_rtol)):
-        if given is not None and not TOLERANCES[0] <= real(given) <= TOLERANCES[1]:
-            raise RequestError(
-                f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r}."
-            )
+        if given is not None:
+            tolerance(name, given)
     if agreement is not None and not 0.0 < real(agreement) < 1.0:
         raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
     return Query(

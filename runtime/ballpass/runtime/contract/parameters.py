@@ -221,6 +221,13 @@ def real(value: object) -> float:
     return math.nan if number is None else number
 
 
+def whole(name: str, value: object) -> int:
+    """A whole number from 1 on; RequestError for another."""
+    if not (1.0 <= real(value) < math.inf and real(value).is_integer()):
+        raise RequestError(f"{name}: a whole number from 1 on is expected, not {value!r:.80}.")
+    return int(real(value))
+
+
 def vector(value: object) -> np.ndarray:
     """`value` as an array of numbers, of its own shape; where it is none, one NaN, shape (1,)."""
     try:

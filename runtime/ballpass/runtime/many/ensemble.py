@@ -10,7 +10,6 @@ the results are the same bits for any number of threads.
 from __future__ import annotations
 
 import ctypes
-import math
 import os
 import threading
 import time as clocks
@@ -24,7 +23,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import real, unknown_name
+from ballpass.runtime.contract.parameters import real, unknown_name, whole
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
@@ -331,9 +330,7 @@ def _threads(given: int | None) -> int:
     if given is None:
         # processors that this process may use, where the system reports them
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not (1.0 <= real(given) < math.inf and int(given) == given):
-        raise RequestError(f"threads: a whole number from 1 on is expected, not {given!r}.")
-    return int(given)
+    return whole("threads", given)
 
 
 def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:

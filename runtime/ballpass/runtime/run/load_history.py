@@ -40,9 +40,7 @@ class LoadHistory:
     ----------
     run : the run, as long as it was
     turns : how long its steady part was; None where nothing turns
-    duration : of that [s]
-    shaft_speed : mean of driver or shaft [rad/s]
-    fastest : its highest speed over that, 1 where it does not change [1]
+    fastest : highest speed of driver or shaft over its mean, 1 where it does not change [1]
     speeds : mean speed of the inner ring of each bearing against the outer one, by its prefix [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
     settled : whether that counts as none
@@ -52,8 +50,6 @@ class LoadHistory:
 
     run: Run
     turns: float | None
-    duration: float
-    shaft_speed: float
     fastest: float
     speeds: Mapping[str, float]
     change: float
@@ -132,8 +128,6 @@ def _history(going: ReducedRun) -> LoadHistory:
     return LoadHistory(
         run=replace(going.run, end=going.run.start + duration),
         turns=duration * abs(speed) / driver_angle.TURN if speed else None,
-        duration=duration,
-        shaft_speed=speed,
         fastest=fastest,
         speeds=speeds,
         change=math.inf,

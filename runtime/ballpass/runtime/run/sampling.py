@@ -13,7 +13,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import real, vector, wrong_unit
+from ballpass.runtime.contract.parameters import real, vector, whole, wrong_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import (
@@ -86,7 +86,8 @@ def _sample_times(
     if request.times is None:
         duration = run_length(model, request, turn)
         check_length(begin + duration, turn)
-        per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
+        asked = request.samples_per_cycle
+        per_cycle = whole("samples_per_cycle", model.manifest.run.samples_per_cycle if asked is None else asked)
         # a run-up has most of its turns behind a slow first one
         turns = max(duration / turn, driver_angle.turns_passed(model.manifest, values, begin, begin + duration))
         wanted = np.rint(float(per_cycle) * turns) if turns > 0.0 else float(per_cycle)
@@ -172,10 +173,3 @@ def output_names(manifest: Manifest, asked: Sequence[str] | None) -> tuple[str, 
     if faults:
         raise RequestError("\n".join(faults))
     return names
-
-
-def _whole(name: str, given: int | None, default: int) -> int:
-    value = default if given is None else given
-    if not (1.0 <= real(value) < math.inf and int(value) == value):
-        raise RequestError(f"{name}: a whole number from 1 on is expected, not {value!r:.80}.")
-    return int(value)
