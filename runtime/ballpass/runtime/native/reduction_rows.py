@@ -108,8 +108,12 @@ class ReductionRows:
         numpy.ndarray
             Outer, then inner raceway, loads in kN, shape (members, 2, SECTORS).
         """
-        first = self._sectors + 2 * SECTORS * self.turned.index(prefix + TURNED)
+        first = self.first_place(prefix)
         return rows[:, first : first + 2 * SECTORS].reshape(len(rows), 2, SECTORS)
+
+    def first_place(self, prefix: str) -> int:
+        """Place in a row of the first place of a bearing's outer raceway; all others follow."""
+        return self._sectors + 2 * SECTORS * self.turned.index(prefix + TURNED)
 
     def column(self, kind: str, channel: str) -> int:
         """Place of an entry of `ROWS` in a row."""

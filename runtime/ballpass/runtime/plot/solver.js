@@ -61,7 +61,10 @@ async function solve(values, stale) {
   while (time(first) < least) first += 1;
   const reduced = inMemory(machine.reduction, solver.reduction.size).fill(0); // the highest ball forces, of every step
   reduced[solver.reduction.from] = least * (1 - 1e-9);
-  for (const { top, deflection } of solver.bearings) reduced[top.max_wanted] = reduced[deflection.max_wanted] = 1;
+  for (const { top, deflection, life } of solver.bearings) {
+    reduced[top.max_wanted] = reduced[deflection.max_wanted] = 1;
+    if (life) reduced[life.wanted] = 1;
+  }
   machine.ballpass_reduce(machine.one, machine.reduction);
   const blocks = [], rows = [], nodes = [], states = [], apart = 1e-10 * whole; // closer than this a sample and a switch are one time
   for (let k = 0, end = 0; k <= count; k = end) {
@@ -98,9 +101,9 @@ async function solve(values, stale) {
   }
   machine.ballpass_ratings(machine.one, machine.ratings);
   machine.ballpass_reduce(machine.one, 0);
-  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), found = inMemory(machine.reduction, solver.reduction.size);
+  const ratings = inMemory(machine.ratings, 2 * solver.drawn[1]).slice(), found = inMemory(machine.reduction, solver.reduction.size).slice();
   const tops = solver.bearings.map(({ top }) => ({ value: found[top.max], time: found[top.max_time] })), deflections = solver.bearings.map(({ deflection }) => found[deflection.max]);
-  return { values, known, ratings, tops, deflections, blocks, rows, nodes, states, turn, speed, whole, first, parts: count };
+  return { values, known, ratings, reduced: found, tops, deflections, blocks, rows, nodes, states, turn, speed, whole, first, parts: count };
 }
 
 // Mean over the time of a run of what was measured at its nodes, by trapezoids between samples and the sides of jumps.
@@ -116,36 +119,19 @@ function measured({ nodes }, measure) {
 }
 const rms = (run, series) => Math.sqrt(mean(run, series.map((value) => value * value)));
 
-// Rating life of a bearing [h], as of `ballpass life`, over the passes of this run; 0 where its
-// rings do not turn against each other.
-function lifeOf({ nodes, ratings }, { cage, force, life: { turning, standing, weibull, sectors } }) {
-  const seen = (node, ring) => node[seenAt + 2 * cage + ring], apart = nodes.map((node) => seen(node, 0) - seen(node, 1));
+// Rating life of a bearing [h], as of `ballpass life`, over the passes of this run, from its steps; 0 where its rings do not turn
+// against each other.
+function lifeOf({ nodes, ratings, reduced }, { cage, force, life: { standing, weibull, sectors, turned, raceways } }) {
   // how far the rings turn from one node to the next; angles of cages come back after a turn
-  const turned = apart.map((angle, k) => angle - apart[Math.max(k - 1, 0)]).map((angle) => angle - TURN * Math.round(angle / TURN));
-  const fields = [0, 1].map(() => new Float64Array(sectors + 1)), last = nodes.length - 1;
-  let passes = 0;
-  nodes.forEach((node, k) => { // trapezoids over the passes; loops without closures, for a slider that moves
-    const weight = 0.5 * (Math.abs(turned[k]) + (k < last ? Math.abs(turned[k + 1]) : 0)), angles = [seen(node, 0), seen(node, 1)];
-    passes += weight;
-    for (let ball = 0; ball < force.length; ball += 1) {
-      const load = node[force[ball]];
-      if (!(load > 0)) continue;
-      const power = turning === 3 ? load * load * load : load ** turning;
-      for (let ring = 0; ring < 2; ring += 1) {
-        const turns = angles[ring] / TURN + ball / force.length, place = sectors * (turns - Math.floor(turns)), below = Math.min(Math.floor(place), sectors - 1);
-        fields[ring][below] += weight * power * (below + 1 - place);
-        fields[ring][below + 1] += weight * power * (place - below);
-      }
-    }
+  const apart = nodes.map((node) => node[seenAt + 2 * cage] - node[seenAt + 2 * cage + 1]), passes = reduced[turned];
+  const net = apart.reduce((sum, angle, k) => sum + (k ? angle - apart[k - 1] - TURN * Math.round((angle - apart[k - 1]) / TURN) : 0), 0);
+  if (!(Math.abs(net) > 0.5 * passes)) return 0;
+  const damage = [0, 1].map((ring) => { // of the outer and of the inner raceway; loads in kN
+    const field = reduced.subarray(raceways + ring * sectors, raceways + (ring + 1) * sectors);
+    return field.reduce((sum, power) => sum + (sectors * power / (passes * force.length)) ** weibull, 0) / sectors * (1e3 / ratings[2 * cage + 1 - ring]) ** standing;
   });
-  if (!(Math.abs(turned.reduce((sum, angle) => sum + angle)) > 0.5 * passes)) return 0;
-  const [onOuter, onInner] = fields.map((field) => {
-    field[0] += field[sectors];
-    return (field.subarray(0, sectors).reduce((sum, power) => sum + (sectors * power / (passes * force.length)) ** weibull, 0) / sectors) ** (1 / standing);
-  });
-  const turns = 1e6 * ((onInner / ratings[2 * cage]) ** standing + (onOuter / ratings[2 * cage + 1]) ** standing) ** (-1 / weibull);
-  const speed = passes / (nodes[last][0] - nodes[0][0]);
-  return turns * TURN / speed / 3600;
+  const speed = passes / reduced[solver.reduction.duration];
+  return 1e6 * (damage[0] + damage[1]) ** (-1 / weibull) * TURN / speed / 3600;
 }
 
 // Highest values of measures of a sample, between samples too: the steps do not depend on what is read.

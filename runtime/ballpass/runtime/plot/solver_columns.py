@@ -16,7 +16,7 @@ from ballpass.runtime.contract.plausible_ranges import usual_template
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.export.scene_numbers import columns_of
 from ballpass.runtime.export.web_assembly import drawn_columns
-from ballpass.runtime.native.reduction_rows import DEFLECTION, HEAD, SECTORS, reduction_rows
+from ballpass.runtime.native.reduction_rows import DEFLECTION, HEAD, SECTORS, TURNED, ReductionRows, reduction_rows
 from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
 from ballpass.runtime.ratings.of_bearing import inner_ring_mass, rated_element
@@ -53,7 +53,7 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
         "torque": column.get("drive_torque"),
         "linkage": None if mechanism is None else _linkage(record, numbers["linkage"]["forces"], place, column),
         "bearings": [_bearing(record, info, place, column) for info in drawn],
-        "reduction": {"size": reduction_rows(manifest).size, "from": HEAD.index("from")},
+        "reduction": {"size": reduction_rows(manifest).size} | {name: HEAD.index(name) for name in HEAD},
         "usual": [_usual(manifest, info, place) for info in manifest.usual],
         "limits": {"void": Status.VOID.value, "flattened": FLATTENED, "deflected": MOST_DEFLECTION},
     }
@@ -167,15 +167,17 @@ def _bearing(
         "inner": pair(bearing.inner_state("x").removesuffix(".x")),
         "outer": pair(own("outer")),
         "load": load,
-        "life": _life(bearing) if force.endswith("ball.force") else None,
+        "life": _life(rows, bearing) if force.endswith("ball.force") else None,
     }
 
 
-def _life(bearing: BearingInfo) -> dict[str, float]:
-    """How a life depends on the loads; see `ballpass.runtime.ratings.life.ElementLife`."""
-    of = rated_element(bearing).life
+def _life(rows: ReductionRows, bearing: BearingInfo) -> dict[str, float]:
+    """How a life depends on the loads, see `ballpass.runtime.ratings.life.ElementLife`, and where they are reduced."""
+    of, turned = rated_element(bearing).life, bearing.prefix + TURNED
     return {
-        "turning": float(of.turning),
+        "wanted": rows.column("integral_wanted", turned),
+        "turned": rows.column("integral", turned),
+        "raceways": rows.first_place(bearing.prefix),
         "standing": float(of.standing),
         "weibull": float(of.weibull),
         "sectors": SECTORS,

@@ -428,7 +428,7 @@ static int run_call(ballpass *s, double time)
                                       .reduction = s->reduction,
                                       .work = s->work,
                                       .resume = r->begun,
-                                      .pause = 1};
+                                      .pause = wanted < edges[r->segments]}; /* else the step to it is taken, reductions included */
     r->begun = 1;
     r->result.written = 0;
 #ifdef SCENE_KINKS
@@ -439,7 +439,7 @@ static int run_call(ballpass *s, double time)
 #endif
     const int status = (located ? ballpass_run_located : ballpass_run)(&options, p, c, r->x, r->segments, edges, s->inputs, s->restarts, 1,
                                                                       &wanted, r->state, &r->result);
-    if (status == BALLPASS_PAUSED) return BALLPASS_OK;
+    if (status == BALLPASS_PAUSED || status == BALLPASS_DONE) return BALLPASS_OK;
     r->failed = 1;
     add_fault(&s->faults, "%s. t = %.9g s, step size %.3g s%s%s.", STATUS[status], r->result.time, r->result.step,
               r->result.state >= 0 ? ", worst state " : "", r->result.state >= 0 ? scene_columns[1 + r->result.state].name : "");
@@ -510,7 +510,7 @@ int ballpass_run_to(ballpass *s, double time)
             if (!fault) begin_call(s, r->first + r->segments);
         }
     }
-    if (!fault && time > r->time) fault = run_call(s, time);
+    if (!fault && time > r->time && r->time < r->asked.end) fault = run_call(s, time);
     if (!fault) r->time = time;
     return fault;
 }
