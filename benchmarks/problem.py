@@ -22,8 +22,8 @@ from ballpass.runtime import load
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.model import Model
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.time import timeline
 from benchmarks.press import Press, press_numbers
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -117,9 +117,9 @@ class Cycle:
     @cached_property
     def segments(self) -> Segments:
         """The cycle as the project's stepper takes it."""
-        infos = self.model.manifest.inputs
+        manifest = self.model.manifest
         inputs = [
-            driver_angle.inputs_at(infos, self.numbers.values, float(a), 0.5 * float(a + b))
+            timeline.inputs_at(manifest, self.numbers.values, float(a), 0.5 * float(a + b))
             for a, b in pairwise(self.edges)
         ]
         return Segments(times=self.edges, inputs=np.array(inputs), restarts=np.ones(len(inputs), dtype=bool))

@@ -86,9 +86,10 @@ class IndependentRuns:
         found = [0.0, cycles * turn, *([transient * turn] if transient > 0.0 else [])]
         for item in self._model.manifest.inputs:
             for window in item.windows:
+                turning = next(one for one in self._model.manifest.turnings if one.name == item.turning)
                 for name in window:
-                    first = (values[name] - values[item.offset]) % TURN
-                    times = (first + TURN * np.arange(math.ceil(cycles) + 1)) / values[item.rate]
+                    first = (values[name] - values[turning.offset]) % TURN
+                    times = (first + TURN * np.arange(math.ceil(cycles) + 1)) / values[turning.rate]
                     found += times[times < found[1]].tolist()
         return sorted(found)
 
@@ -98,7 +99,8 @@ class IndependentRuns:
             begin, middle = self.edges[segment, k], 0.5 * (self.edges[segment, k] + self.edges[segment + 1, k])
             row = []
             for item in self._model.manifest.inputs:
-                offset, rate = member.values[item.offset], member.values[item.rate]
+                turning = next(one for one in self._model.manifest.turnings if one.name == item.turning)
+                offset, rate = member.values[turning.offset], member.values[turning.rate]
                 if item.kind == "phase":
                     row.append((offset + rate * begin) % TURN)
                     continue

@@ -72,9 +72,13 @@ class Absolute:
         joint = self.mechanism.joint(self.mechanism.driver.joint)
         self.driven = joint.other(FRAME)
         self.motor, self.table = self.mechanism.driver.torque, self.mechanism.driver.table  # neither: constant speed
-        self.free = self.motor is not None or self.table is not None  # the driver's angle is a state
+        # the driver's angle is a state
+        self.free = self.motor is not None or (self.table is not None and not self.bearings)
         self.acceleration = 0.0  # of the driver, where its speed is given
-        self.lagging = [b for b in self.bearings if b.cage is not None and b.cage.time]  # slip that changes
+        # slip that changes: a lag is a state where the rings swing, or a motor drives
+        slipping = [b for b in self.bearings if b.cage is not None and b.cage.time]
+        self.lagging = [b for b in slipping if self.motor is not None or not {*self.rings(b)} <= {FRAME, self.driven}]
+        self.known_lags = [b for b in slipping if b not in self.lagging]
         self.lags, self.time = dict.fromkeys((b.name for b in self.lagging), 0.0), 0.0
         self._arms: dict[tuple[str, str], Array] = {}
         self._chain = [(self.start, self._closed(self.start, self._guessed(guess)))]
@@ -238,11 +242,26 @@ class Absolute:
         return q
 
     def drive(self, t: float, x: Array) -> tuple[float, float]:
-        """Angle and speed of the driven body: in the state, before the lags of cages, where the speed changes."""
+        """Angle and speed of the driven body: in the state, before the lags of cages, or by its table."""
         if not self.free:
-            return self.start + self.speed * t, self.speed
+            return self.driver_at(t)
         behind = 1 + len(self.lagging)
         return float(x[len(x) // 2 - behind]), float(x[-behind])
+
+    def rings(self, bearing: Bearing) -> tuple[str, str]:
+        """Bodies that carry the inner and the outer ring."""
+        inner = bearing.inner_body or self.driven
+        return inner, self.mechanism.joint(bearing.joint or "").other(inner)
+
+    def driver_at(self, t: float) -> tuple[float, float]:
+        """Angle and speed of a driver whose speed is given: trapezoids between the rows of its table."""
+        if self.table is None:
+            return self.start + self.speed * t, self.speed
+        times = np.array([self.value(q) for q in self.table.time])
+        speeds = [self.value(q) for q in (self.mechanism.driver.speed, *self.table.later_speed)]
+        edges = np.array([0.0, *times[(times > 0.0) & (times < t)], t])
+        rates = np.interp(edges, times, speeds)
+        return self.start + float(np.trapezoid(rates, edges)), float(rates[-1])
 
     def slope(self, t: float) -> float:
         """Acceleration of the driver by the table of its speed."""
@@ -258,6 +277,7 @@ class Absolute:
         (angle, rate), half = self.drive(t, x), len(x) // 2
         self.time, last = t, x[len(x) - len(self.lagging) :]
         self.lags = {bearing.name: float(lag) for bearing, lag in zip(self.lagging, last, strict=True)}
+        self.lags |= {bearing.name: self.known_lag(bearing, t) for bearing in self.known_lags}
         shifts: dict[str, Array] = {}
         speeds: dict[str, Array] = {}
         rings, ring_rates, k = [], [], 0

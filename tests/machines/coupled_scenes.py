@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import casadi as ca
 import numpy as np
@@ -16,6 +16,8 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import NamedPoint, Scene
 from ballpass.derive.variables import Input
+from ballpass.runtime.contract.manifest import TurningInfo
+from ballpass.runtime.time.turning import Turning
 
 UNDAMPED = 'law = "none"'
 TANGENT = 'law = "tangent"\nratio = "2.5e-5 s"'
@@ -161,18 +163,23 @@ class Derived:
 
     def at(self, t: float, x: np.ndarray, gates: Mapping[str, float]) -> list[np.ndarray]:
         """Rates of the states, outputs, angles of the first balls, places of points, torque by the balances."""
-        inputs = [
+        uneven = any(one.times or one.turns for one in self.system.turnings)
+        turned = {
+            one.name: Turning.of(TurningInfo(**asdict(one)), self._known).held(t if uneven else 0.0, t)
+            for one in self.system.turnings
+        }
+
+        def value(i: Input) -> float:
+            if i.kind in ("phase", "angle", "rate", "slope") and i.turning is not None:
+                return float(turned[i.turning.name][{"rate": 1, "slope": 2}.get(i.kind, 0)])
+            if i.kind == "table_rate":
+                return self._slope(i, t)
             # no side of a window is held
-            0.0
-            if i.kind == "border"
-            else self._known[i.offset]
-            if i.kind == "phase"
-            else self._slope(i, t)
-            if i.kind == "table_rate"
-            else gates[i.name.removeprefix("gate.")]
-            for i in self.system.inputs
-        ]
-        return [part.full()[:, 0] for part in self._function(t, x, inputs, self._p, self._c)]
+            return 0.0 if i.kind == "border" else gates[i.name.removeprefix("gate.")]
+
+        inputs = [value(i) for i in self.system.inputs]
+        local = 0.0 if uneven else t  # time since the reference time
+        return [part.full()[:, 0] for part in self._function(local, x, inputs, self._p, self._c)]
 
     def _slope(self, table: Input, t: float) -> float:
         """Of a table over time, flat before its first row and behind its last."""
@@ -186,9 +193,10 @@ class Derived:
         """Gates of spalls that balls pass evenly."""
         known, found = self._known, {}
         for gate in self.system.inputs:
-            if gate.kind == "gate" and "defects." in gate.name:
+            if gate.kind == "gate" and "defects." in gate.name and (turning := gate.turning) is not None:
                 ((first, last),) = gate.windows
-                past = (known[gate.offset] + known[gate.rate] * t - known[first]) % (2 * np.pi)
+                angle = gate.parts * float(Turning.of(TurningInfo(**asdict(turning)), known).at(t)[0])
+                past = (angle - known[first]) % (2 * np.pi)
                 found[gate.name.removeprefix("gate.")] = float(past < known[last] - known[first])
         return found
 

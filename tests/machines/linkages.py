@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from ballpass.derive.drive.constant_speed import ConstantSpeed
+from ballpass.derive.drive import KnownDrive
 from ballpass.derive.mechanism.forces import BodyTorque, ConstantForce, Forces, PointForce, Windows, derive_forces
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
@@ -17,19 +17,28 @@ from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
-from ballpass.derive.variables import phase
+from ballpass.derive.terms import TIME
+from ballpass.derive.variables import Turning
 
 ANGLE = sp.Symbol("theta", real=True)
 SPEED = sp.Symbol("mechanism.driver.speed", real=True)
 DEGREE = math.pi / 180.0
 
 #: Of constant speed, with symbols of its own.
-DRIVE = ConstantSpeed(
+DRIVE = KnownDrive(
     angle=ANGLE,
     speed=SPEED,
     acceleration=sp.S.Zero,
     description="the driver's speed is constant",
-    phase=phase("driver", "angle", "q", offset="mechanism.driver.start_angle", rate="mechanism.driver.speed"),
+    turning=Turning(
+        name="driver",
+        kind="driver",
+        words="the driver",
+        offset="mechanism.driver.start_angle",
+        rate="mechanism.driver.speed",
+        speeds=("mechanism.driver.speed",),
+    ),
+    passed=SPEED * TIME,
 )
 
 #: None: zero.  A number: along the body's x axis.  ("xy", x, y).  ("polar", length, angle).

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from absolute import QUARTER, TURN, Absolute, Array, rotation
@@ -68,6 +69,17 @@ class Multibody(Absolute):
         start, joint = self._chain[0][1], self.mechanism.joint(bearing.joint or "")
         inner, outer = bearing.inner_body, joint.other(bearing.inner_body)
         return self.angle(inner, q) - self.angle(inner, start), self.angle(outer, q) - self.angle(outer, start)
+
+    def known_lag(self, bearing: Bearing, time: float) -> float:
+        """Lag of a cage between rings that turn with the driver, which a table or a speed gives: row by row."""
+        assert bearing.cage is not None
+        rows = [self.value(row) for row in bearing.cage.time]
+        total = self.value(bearing.cage.lag)
+        for begin, end in pairwise([*(row for row in rows if row < time), time]):
+            moved = self.driver_at(end)[0] - self.driver_at(begin)[0]
+            lost = np.subtract(self.weights(bearing, math.inf), self.weights(bearing, 0.5 * (begin + end)))
+            total += float(lost @ [moved if body == self.driven else 0.0 for body in self.rings(bearing)])
+        return total
 
     def slip(self, bearing: Bearing, time: float) -> float:
         """Of the cage: that of the row that holds."""

@@ -12,8 +12,8 @@ import numpy as np
 from ballpass.runtime import Model
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.stepper import Outcome, Segments
-from ballpass.runtime.run import driver_angle
-from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.run.segments import TURNED, segment_edges
+from ballpass.runtime.time import timeline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,16 +30,16 @@ def segments_between(model: Model, numbers: Numbers, edges: np.ndarray, gates: n
     inputs = model.manifest.inputs
     middles = [0.5 * (a + b) for a, b in pairwise(edges if gates is None else gates)]
     pairs = zip(edges[:-1], middles, strict=True)
-    u = np.array([driver_angle.inputs_at(inputs, numbers.values, float(a), float(middle)) for a, middle in pairs])
+    u = np.array([timeline.inputs_at(model.manifest, numbers.values, float(a), float(middle)) for a, middle in pairs])
     u = u.reshape(len(edges) - 1, len(inputs))
-    switching = [k for k, info in enumerate(inputs) if info.kind != "phase"]
+    switching = [k for k, info in enumerate(inputs) if info.kind not in TURNED]
     restarts = np.concatenate([[True], np.any(np.diff(u[:, switching], axis=0) != 0.0, axis=1)])
     return Segments(times=np.array(edges, dtype=float), inputs=u, restarts=restarts)
 
 
 def edges_of(model: Model, numbers: Numbers, begin: float, end: float) -> np.ndarray:
     """Breakpoints and whole turns of a run, with its begin and end [s]."""
-    return segment_edges(model, numbers, begin, end, driver_angle.period(model.manifest, numbers.values))
+    return segment_edges(model, numbers, begin, end, timeline.period(model.manifest, numbers.values))
 
 
 def run(

@@ -65,7 +65,7 @@ def test_no_answer_takes_turns_behind_the_table(worked: Model) -> None:
     ):
         with pytest.raises(RequestError, match=r"rows between 0\.4 s and 1\.2 s"):
             points()
-    with pytest.raises(RequestError, match="table over time, which has no period"):
+    with pytest.raises(RequestError, match="table over time that goes on"):
         worked.steady(turns=1)
     # the peak of the heavy load is no impact of the start
     assert warnings_of_transient(worked, {}, cycles=20, transient=2) == []

@@ -132,8 +132,7 @@ def test_count_of_segments_is_what_making_them_takes(
 
 def test_phases_that_are_cut_short_of_rounding_count(press: Model) -> None:
     """A load that turns a million million times faster than the shaft has a segment for each million radians."""
-    fast = press.manifest.inputs[0]
-    assert fast.kind == "phase"
+    fast = press.manifest.turnings[0]
     numbers = press.numbers()
     rate = 1e6 * 2.0**29 / 7.9  # in a second, with eight numbers a segment: just too many
     crowded = replace(numbers, values={**numbers.values, fast.rate: rate})

@@ -39,13 +39,22 @@ DEFAULTS = {
     "initial.x": ("m", 0.01),
     "initial.v": ("m/s", -0.2),
 }
+TURNINGS = (
+    mf.TurningInfo(
+        name="driver",
+        kind="driver",
+        words="the driver",
+        offset="driver.start_angle",
+        rate="driver.speed",
+        speeds=("driver.speed",),
+    ),
+)
 INPUTS = (
-    mf.InputInfo(name="phase.driver", kind="phase", offset="driver.start_angle", rate="driver.speed"),
+    mf.InputInfo(name="phase.driver", kind="phase", turning="driver"),
     mf.InputInfo(
         name="gate.push",
         kind="gate",
-        offset="driver.start_angle",
-        rate="driver.speed",
+        turning="driver",
         windows=(("push.window.start", "push.window.end"),),
     ),
     *(
@@ -151,6 +160,7 @@ def manifest(
             ),
         ),
         initial=("initial.x", "initial.v"),
+        turnings=TURNINGS,
         inputs=INPUTS,
         outputs=OUTPUTS,
         functions=tuple(

@@ -24,11 +24,11 @@ from ballpass.runtime.many.members import Members, Span, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import End
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.resolve import SCALED_TURNS
-from ballpass.runtime.run.segments import edge_windows, segment_edges
+from ballpass.runtime.run.segments import TURNED, edge_windows, segment_edges
+from ballpass.runtime.time import timeline
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = (
@@ -294,7 +294,7 @@ def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> Non
         clearance = np.linspace(4e-6, 3e-5, count)
         members = make_members(model, {"bearing.clearance": clearance})
         numbers = [members.numbers(model, k) for k in range(count)]
-        turns = np.array([driver_angle.period(model.manifest, n.values) for n in numbers])
+        turns = np.array([timeline.period(model.manifest, n.values) for n in numbers])
         span = Span(durations=2 * turns, turns=turns, starts=np.zeros(count))
         looked_at = moments(model, members, span, np.arange(count))
         found = model.ensemble_driver.magnitudes(MemberNumbers(p=members.p, c=members.c), members.initial, *looked_at)
@@ -320,7 +320,7 @@ def test_loads_from_tables_run_in_ensembles(make_model: ModelMaker) -> None:
     times = next(name for name in model.parameters if "time" in name and name.endswith("2"))
     columns = {times: np.array([0.01, 0.02, 0.03]), "bearing.clearance": np.array([0.0, 1e-6, 2e-6])}
     members = make_members(model, columns)
-    turns = np.array([driver_angle.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
+    turns = np.array([timeline.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
     for start in (0.0, 0.005, 0.02):
         assert_segments_of_one(model, members, Span(durations=np.full(3, 0.1), turns=turns, starts=np.full(3, start)))
     result = model.simulate_many(columns, ["rms:inner.x"], duration=0.1, transient=0, rtol=1e-9)
@@ -354,7 +354,7 @@ def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> 
     found = schedule.inputs(np.hstack([members.p, members.c]), owner, times, times + 1e-4)
     for row, (k, time) in enumerate(zip(owner, times, strict=True)):
         values = members.numbers(model, int(k)).values
-        assert np.array_equal(found[row], driver_angle.inputs_at(model.manifest.inputs, values, time, time + 1e-4))
+        assert np.array_equal(found[row], timeline.inputs_at(model.manifest, values, time, time + 1e-4))
 
 
 def assert_segments_of_one(model: Model, members: Members, span: Span) -> None:
@@ -371,16 +371,16 @@ def assert_segments_of_one(model: Model, members: Members, span: Span) -> None:
         times = [part.times[a + k : b + k + 1] for part, a, b in own]
         assert np.array_equal(np.concatenate([times[0], *(some[1:] for some in times[1:])]), edges), k
         middles = 0.5 * (edges[:-1] + edges[1:])
-        expected = driver_angle.inputs_over(inputs, numbers.values, edges[:-1], middles)
+        expected = timeline.inputs_over(model.manifest, numbers.values, edges[:-1], middles)
         assert np.array_equal(np.concatenate([part.inputs[a:b] for part, a, b in own]), expected), k
-        gates = [place for place, info in enumerate(inputs) if info.kind != "phase"]
+        gates = [place for place, info in enumerate(inputs) if info.kind not in TURNED]
         jumps = [True, *np.any(np.diff(expected[:, gates], axis=0) != 0.0, axis=1)]
         assert np.array_equal(np.concatenate([part.restarts[a:b] for part, a, b in own]), jumps), k
         edges = segment_edges(model, numbers, 0.0, min(duration, SCALED_TURNS * turn), turn)
         middles = 0.5 * (edges[:-1] + edges[1:])
         looked = np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))
         at = np.concatenate([middles[looked], min(duration, turn) * (np.arange(MOMENTS) + 0.5) / MOMENTS])
-        expected = driver_angle.inputs_over(inputs, numbers.values, at, at)
+        expected = timeline.inputs_over(model.manifest, numbers.values, at, at)
         assert np.array_equal(looked_at[first[k] : first[k + 1]], expected), k
         assert horizons[k] == min(duration, turn)
 
@@ -420,7 +420,7 @@ def test_segments_of_fast_loads_on_slow_shafts_are_those_made_for_one(make_model
     model = make_model("varying_compliance", (LOAD, wave), ('force = ["196 N", "0 N"] ', ""))
     fast = next(name for name in model.parameters if name.endswith("frequency"))
     members = make_members(model, {fast: np.array([50.0, 1e7, 3e7])})
-    turns = np.array([driver_angle.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
+    turns = np.array([timeline.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
     span = Span(durations=2.0 * turns, turns=turns, starts=turns)
     assert_segments_of_one(model, members, span)
     (whole,) = stretches(model, members, span, np.arange(3))

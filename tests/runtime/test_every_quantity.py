@@ -21,7 +21,7 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.certify.simplification import measure_simplification
 from ballpass.runtime.certify.trade import REFERENCE, measure_trade
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run.driver_angle import period
+from ballpass.runtime.time.timeline import period
 
 #: How kinds are asked for that take no state, or want a place.
 NAMES = {

@@ -28,9 +28,9 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.bounds import allowed
 from ballpass.runtime.contract.manifest import ParameterInfo
 from ballpass.runtime.export.c_program import export_c
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.time import timeline
 
 SHORT, LONG = (
     ("punching_press",),
@@ -408,21 +408,21 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
     program = exported(scene, *changes)
     model = program.model
     inputs, resolved = model.manifest.inputs, model.numbers(numbers)
-    turn = driver_angle.period(model.manifest, resolved.values)
+    turn = timeline.period(model.manifest, resolved.values)
     edges = segment_edges(model, resolved, 0.0, length, turn)
-    angles = [resolved.values[item.offset] if item.offset else 0.0 for item in inputs]
-    values = np.concatenate([resolved.p, resolved.c, angles])
+    angles = [resolved.values[info.offset] for info in model.manifest.turnings]
+    values = np.concatenate([resolved.p, resolved.c, angles, [np.nan, 0.0, 0.0]])
     library = tmp_path / "schedule.so"
     sources = [str(program.folder / name) for name in ("schedule.c", "scene.c")]
     subprocess.run(["cc", "-std=c99", "-O2", "-shared", "-fPIC", *sources, "-o", str(library), "-lm"], check=True)
     code = ctypes.CDLL(str(library))
     real, long, pointer = ctypes.c_double, ctypes.c_long, ctypes.c_void_p
-    given = (ctypes.addressof(ctypes.c_char.in_dll(code, "scene_inputs")), len(inputs), values.ctypes.data)
+    given = (ctypes.addressof(ctypes.c_char.in_dll(code, "scene_schedule")), values.ctypes.data)
     code.schedule_edges.restype = long
-    code.schedule_edges.argtypes = (pointer, ctypes.c_int, pointer, real, real, real, pointer)
-    code.schedule_inputs.argtypes = (pointer, ctypes.c_int, pointer, real, real, pointer)
+    code.schedule_edges.argtypes = (pointer, pointer, real, real, real, pointer)
+    code.schedule_inputs.argtypes = (pointer, pointer, real, real, pointer)
     code.schedule_most_segments.restype = real
-    code.schedule_most_segments.argtypes = (pointer, ctypes.c_int, pointer, real, real)
+    code.schedule_most_segments.argtypes = (pointer, pointer, real, real)
     found = ctypes.POINTER(real)()
     count = code.schedule_edges(*given, 0.0, length, turn, ctypes.addressof(found))
     assert np.array_equal(np.array(found[: count + 1]), edges)
@@ -430,7 +430,7 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
     u = np.zeros(len(inputs))
     for left, right in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         code.schedule_inputs(*given, left, 0.5 * (left + right), u.ctypes.data)
-        assert np.array_equal(u, driver_angle.inputs_at(inputs, resolved.values, left, 0.5 * (left + right)))
+        assert np.array_equal(u, timeline.inputs_at(model.manifest, resolved.values, left, 0.5 * (left + right)))
 
 
 # as a library

@@ -32,7 +32,7 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.export.fmu import export_fmu, input_names, platform_tuple
 from ballpass.runtime.export.model_description import base_powers
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
 
 fmpy = pytest.importorskip("fmpy", reason="needs FMPy: pip install ballpass[dev]")
 fmi3 = pytest.importorskip("fmpy.fmi3")
@@ -351,9 +351,9 @@ def test_derivatives_are_those_of_differences(exported: Callable[..., Exported])
 
         def values(numbers: dict[str, float], state: np.ndarray) -> np.ndarray:
             resolved = model.numbers(numbers)
-            edges = driver_angle.breakpoints(manifest.inputs, resolved.values, 0.0, 0.0831)
+            edges = timeline.breakpoints(manifest, resolved.values, 0.0, 0.0831)
             start = float(edges[-1])
-            u = driver_angle.inputs_at(manifest.inputs, resolved.values, start, 0.083)
+            u = timeline.inputs_at(manifest, resolved.values, start, 0.083)
             there = {"t": 0.0831 - start, "x": state, "u": u, "p": resolved.p, "c": resolved.c}
             kernel = model.kernel("outputs")
             kernel.run(there)

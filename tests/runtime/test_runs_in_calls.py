@@ -21,7 +21,7 @@ from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import End, Outcome, Stepper
-from ballpass.runtime.run import driver_angle, limits, loop
+from ballpass.runtime.run import limits, loop
 from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import KeptSteps, RunFailed, RunUnderWay, Samples, segments_of, start_run
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
@@ -29,6 +29,7 @@ from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.segments import make_segments, segment_edges, time_resolution
+from ballpass.runtime.time import timeline
 
 ModelMaker = Callable[..., Model]
 CLEARANCE = "bearing.clearance"
@@ -38,10 +39,10 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     """Two turns in calls of so many steps, every other one in another thread: what the driver tells at the end; state,
     reductions and samples; number of calls."""
     numbers = model.numbers()
-    turn = driver_angle.period(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
     state = np.array([numbers.values[name] for name in model.manifest.initial])
     tolerance = 1e-6 * stepper_magnitudes(model, model.ensemble_driver.stepper, numbers, state, 2.0 * turn, turn)
-    segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))
+    segments = make_segments(model.manifest, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))
     layout = model.ensemble_driver.rows
     row = layout.empty(1, turn, layout.all_of(channel_names(model.manifest)))[0]
     times = np.linspace(0.0, 2.0 * turn, 77)

@@ -17,9 +17,9 @@ from ballpass.runtime import IntegrationError, Model, RequestError, Sensitivitie
 from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native.stepper import End, Outcome, Segments
 from ballpass.runtime.point.evaluate import neighbour
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.directions import Directions
+from ballpass.runtime.time import timeline
 
 # preload: every ball stays in contact, and the motion is smooth in every parameter
 SMOOTH = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.2, "bearing.initial.inner.y": 2e-6}
@@ -31,7 +31,7 @@ def fixed_steps(
     """States at eight times with steps that no parameter changes, and their derivatives along `names`."""
     # differences look slightly beyond values at their bounds
     numbers = neighbour(model, model.numbers(), parameters)
-    u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)[None, :]
+    u = timeline.inputs_at(model.manifest, numbers.values, 0.0)[None, :]
     segments = Segments(times=np.array([0.0, duration]), inputs=u, restarts=np.array([True]))
     times = duration * np.arange(1, 9) / 8 - 0.3 * step  # off the steps: dense output takes part
     states = np.zeros((len(times), len(model.states)))
@@ -170,7 +170,6 @@ def test_a_rejected_step_leaves_no_trace_in_the_derivatives(make_model: Callable
     next accepted step is that of a run which begins there."""
     model = make_model("punching_press")
     numbers = model.numbers()
-    inputs = model.manifest.inputs
     names = ["bearing.clearance", "mechanism.driver.speed", "bearing.initial.inner.y"]
     magnitude = np.repeat([1e-5, 0.1], 4)
 
@@ -179,7 +178,7 @@ def test_a_rejected_step_leaves_no_trace_in_the_derivatives(make_model: Callable
     ) -> tuple[Outcome, np.ndarray, np.ndarray]:
         segments = Segments(
             times=np.array([begin, 0.05]),
-            inputs=driver_angle.inputs_at(inputs, numbers.values, begin)[None, :],
+            inputs=timeline.inputs_at(model.manifest, numbers.values, begin)[None, :],
             restarts=np.array([True]),
         )
         directions = Directions(model, numbers, names, 0)

@@ -1,7 +1,7 @@
 """Events of a model: where its equations change, each a switching function with its rate.
 
 In: the inputs of a model and its bearings.  Out: `Event` after `Event`.  Steps end on all of them.  Zeros of a function
-of time, or of an angle that turns at constant speed, are known before a run: its segments end there.  Zeros of a
+of time, or of an angle that turns with a given speed, are known before a run: its segments end there.  Zeros of a
 function of the state are located in the step in which they occur.
 """
 
@@ -56,23 +56,25 @@ def events_of(
 
 def _of_input(item: Input) -> Iterator[Event]:
     """Edges of windows, and knots of tables over time or an angle."""
-    turns = item.rate != ""
-    rate = sp.Symbol(item.rate, real=True) if turns else sp.S.One
-    passed = sp.Symbol(item.offset, real=True) + rate * TIME if turns else TIME
+    turning, passed, rate, uneven = item.turning, TIME, sp.S.One, ""
+    if turning is not None:
+        rate = sp.Symbol(turning.rate, real=True)
+        passed = sp.Symbol(turning.offset, real=True) + rate * TIME
+        uneven = ", of an angle whose rate changes" if turning.turns or turning.times else ""
     if item.kind == "gate":
         for edge in (edge for window in item.windows for edge in window):
-            function = passed - sp.Symbol(edge, real=True)
-            lags = ", the angle less the lag of the cage" if item.times else ""
-            yield Event(name=edge, kind="angle", function=function, rate=rate, changes=f"`{item.name}`{lags}")
+            function = item.parts * passed - sp.Symbol(edge, real=True)
+            changes = f"`{item.name}`{uneven}"
+            yield Event(name=edge, kind="angle", function=function, rate=item.parts * rate, changes=changes)
     elif item.kind in ("table", "table_rate"):
         changes = f"the slope of `{item.name}`" if item.kind == "table" else f"`{item.name}`"
         for knot in item.times[:1]:
             yield Event(
                 name=f"{knot} and the {len(item.times) - 1} rows behind",
-                kind="angle" if turns else "time",
+                kind="time" if turning is None else "angle",
                 function=passed - sp.Symbol(knot, real=True),
                 rate=rate,
-                changes=changes,
+                changes=f"{changes}{uneven}",
             )
 
 

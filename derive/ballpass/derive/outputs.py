@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.drive import KnownDrive
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
@@ -93,6 +94,18 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
     words = "Torque of the drive on the driven body, counter-clockwise"
     out.append(Output(name="drive_torque", expression=torque, unit="N*m", description=words))
     angle = drive.coordinate
+    if isinstance(drive, KnownDrive) and drive.whole is not None:
+        out.append(
+            Output(name="drive_power", expression=torque * drive.speed, unit="W", description="Power of the drive")
+        )
+        out += [
+            Output(name=f"driver.{key}", expression=expression, unit=unit, description=f"{words} of the driven body")
+            for key, expression, unit, words in (
+                ("angle", drive.whole, "rad", "Angle, whole turns counted,"),
+                ("speed", drive.speed, "rad/s", "Speed"),
+                ("acceleration", drive.acceleration, "rad/s^2", "Angular acceleration"),
+            )
+        ]
     if angle is None:
         words = "Angle of the driven body, within the turn"
         within = _within_turn(DRIVER_ANGLE, sp.S.Zero)

@@ -15,6 +15,7 @@ import sympy as sp
 
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.drive import KnownDrive
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
@@ -88,7 +89,7 @@ def power_outputs(
         out.append(("weight.power", power_of(weights), "W", "Power of all weights"))
         height = sp.Add(*(-weight.amount * weight.place for weight in weights))
         out.append(("weight.energy", height, "J", "Potential energy of all weights, 0 at the frame's origin"))
-    if linkage.drive.coordinate is None:
+    if isinstance(linkage.drive, KnownDrive) and linkage.drive.even:  # else it is listed
         power = reactions.drive_torque * linkage.drive.speed
         out.append(("drive_power", power, "W", "Power of the drive"))
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2

@@ -27,7 +27,7 @@ from ballpass.derive.bearing.equations import (
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import own_loads, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, drive_of
+from ballpass.derive.drive import Drive, KnownDrive, drive_of, shaft_drive
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
@@ -49,7 +49,7 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch, Turning
 from ballpass.runtime.contract.arguments import typed
 
 
@@ -116,6 +116,11 @@ class System:
         return found
 
     @property
+    def turnings(self) -> tuple[Turning, ...]:
+        """Angles that are known before a run, of the inputs."""
+        return tuple(dict.fromkeys(i.turning for i in self.inputs if i.turning is not None))
+
+    @property
     def states(self) -> tuple[State, ...]:
         """Positions, then velocities."""
         positions = (
@@ -177,13 +182,13 @@ def _noted(errors: list[SceneError]) -> Iterator[None]:
 def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
     """Bearings on a shaft, under the scene's own load."""
     own = own_loads(scene)
-    speed = sp.S.Zero if scene.shaft is None else symbol_of(scene.shaft.speed)
+    drive = None if scene.shaft is None else shaft_drive(scene.shaft)
     outer = scene.shaft is not None and scene.shaft.ring == "outer"
     rings = []
     for bearing in scene.bearings:
         share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
         load = (share * own.force[0], share * own.force[1])
-        rings.append(_rings(bearing, cage_on_shaft(bearing, speed, outer=outer), load, inner_mass(bearing, None)))
+        rings.append(_rings(bearing, cage_on_shaft(bearing, drive, outer=outer), load, inner_mass(bearing, None)))
     return _of_rings(scene, rings, errors, inputs=own.inputs, definitions=own.definitions, constants=own.constants)
 
 
@@ -210,7 +215,7 @@ def _linked(
 
 def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
     """An ideal linkage, and the bearings that its reactions load."""
-    drive = drive_of(mechanism.driver)
+    drive = drive_of(mechanism.driver, alone=not scene.bearings)
     linked, reactions = _linked(scene, mechanism, drive, NO_PLAY, errors), None
     if linked is not None:
         linkage, forces = linked
@@ -250,19 +255,19 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
 def _cage(bearing: Bearing, mechanism: Mechanism, linkage: Linkage) -> Cage:
     """Balls of a bearing at the driver's joint, whose play does not move the linkage."""
     drive = linkage.drive
-    if drive.coordinate is None:
-        return cage_on_shaft(bearing, drive.speed)
+    if isinstance(drive, KnownDrive) and drive.even:
+        return cage_on_shaft(bearing, drive)
     carriers = linkage.pose(linkage.driven), linkage.pose(FRAME)
     return cage_between(bearing, carriers, (WITH_DRIVER, STILL), mechanism.driver, drive)
 
 
 def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
     """A linkage whose joints have the play of its bearings, or that a torque drives: one set of equations of motion."""
-    drive = drive_of(mechanism.driver)
+    drive = drive_of(mechanism.driver, alone=not scene.bearings)
     rings = [c for bearing in scene.bearings for c in own_coordinates(bearing)]
     positions = tuple(c.position for c in rings)
     # the heaviest last: M is factored in this order, without pivoting
-    coordinates = (*rings, *_driven(drive, known=False))
+    coordinates = (*rings, *_driven(drive))
     joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
     play = {joints[b.name].name: play_of(b, joints[b.name], ring_coordinates(b)) for b in scene.bearings}
     linked = _linked(scene, mechanism, drive, play, errors)
@@ -367,11 +372,9 @@ def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:
     return frozenset(name for name in guides if is_asked(scene.outputs, f"reaction.{name}.moment"))
 
 
-def _driven(drive: Drive | None, *, known: bool | None = None) -> tuple[Coordinate, ...]:
-    """The driver's angle where it is a state; with `known` only if its acceleration is known, or is not."""
-    if drive is None or drive.coordinate is None or known not in (None, drive.torque is None):
-        return ()
-    return (drive.coordinate,)
+def _driven(drive: Drive | None) -> tuple[Coordinate, ...]:
+    """The driver's angle where it is a state that its torque moves."""
+    return () if drive is None or drive.coordinate is None else (drive.coordinate,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -456,9 +459,11 @@ def _system(
     forces: Forces | None = None,
 ) -> System:
     driven, lags = _driven(drive), [cage.lag for cage in cages if cage.lag is not None]
+    known = []
+    if isinstance(drive, KnownDrive) and drive.passive is not None:
+        driven, known = (drive.passive,), [drive.acceleration]
     switches = (() if forces is None else forces.switches) + tuple(s for cage in cages for s in cage.switches)
     inputs = (*inputs, *(i for cage in cages for i in cage.inputs))
-    known = [] if drive is None else [drive.acceleration for _ in _driven(drive, known=True)]
     for acceleration in (*known, *(rate for _, rate in lags)):
         mass = sp.ImmutableMatrix(sp.diag(mass, 1))
         forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([acceleration])))
@@ -495,7 +500,7 @@ def _system(
         outputs=outputs,
         smoothness=(
             *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
-            *(("driver.torque", drive.smoothness) for _ in _driven(drive, known=False) if drive is not None),
+            *(("driver.torque", drive.smoothness) for _ in _driven(drive) if drive is not None),
             *(() if forces is None else forces.smoothness),
         ),
         events=events_of(inputs, bearings, switches),

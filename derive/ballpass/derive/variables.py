@@ -26,17 +26,54 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Turning:
+    """An angle that is known before a run; fields as in `manifest.TurningInfo`."""
+
+    name: str
+    kind: Literal["driver", "cage", "pass", "spin", "load"]
+    words: str
+    offset: str
+    rate: str
+    parts: int = 1
+    turns: str = ""
+    times: tuple[str, ...] = ()
+    speeds: tuple[str, ...] = ()
+    rolling: str = ""
+    lag: str = ""
+    lag_times: tuple[str, ...] = ()
+    lags: tuple[str, ...] = ()
+
+    def phase(self, description: str, latex: str) -> Input:
+        """Its angle at the reference time."""
+        return self._at("phase", "rad", description, latex)
+
+    def whole(self, description: str, latex: str) -> Input:
+        """Its angle there with whole turns."""
+        return self._at("angle", "rad", description, latex)
+
+    def rate_input(self, description: str, latex: str) -> Input:
+        """Its rate at the reference time."""
+        return self._at("rate", "rad/s", description, latex)
+
+    def _at(self, kind: Literal["phase", "angle", "rate"], unit: str, description: str, latex: str) -> Input:
+        name = f"{kind}.{self.name}"
+        symbol = sp.Symbol(name, real=True)
+        return Input(name=name, symbol=symbol, kind=kind, unit=unit, description=description, latex=latex, turning=self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
     """Held constant between breakpoints by the integrator; `kind` and fields as in `manifest.InputInfo`."""
 
     name: str
     symbol: sp.Symbol
-    kind: Literal["phase", "gate", "table", "table_rate", "border"]
+    kind: Literal["phase", "angle", "rate", "slope", "gate", "table", "table_rate", "border"]
     unit: str
     description: str
     latex: str
-    offset: str = ""
-    rate: str = ""
+    turning: Turning | None = None
+    turns: int = 1
+    parts: int = 1
     windows: tuple[tuple[str, str], ...] = ()
     times: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
@@ -57,20 +94,6 @@ class StateSwitch:
     changes: str
     angle: sp.Expr | None = None
     turning: sp.Expr = sp.S.Zero
-
-
-def phase(name: str, description: str, latex: str, *, offset: str, rate: str) -> Input:
-    """An angle that turns at a constant rate: `offset` names it at t = 0 [rad], `rate` its speed [rad/s]."""
-    return Input(
-        name=f"phase.{name}",
-        symbol=sp.Symbol(f"phase.{name}", real=True),
-        kind="phase",
-        unit="rad",
-        description=description,
-        latex=latex,
-        offset=offset,
-        rate=rate,
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage_slip import kept_share, lag_of, lag_state
+from ballpass.derive.bearing.cage_slip import excess_slip, kept_share, lag_at_rows, lag_coordinate, lag_names
 from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
-from ballpass.derive.drive import Drive, OverAngle
+from ballpass.derive.drive import Drive, KnownDrive, OverAngle
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
-from ballpass.derive.variables import Coordinate, Input, StateSwitch, phase
+from ballpass.derive.variables import Coordinate, Input, StateSwitch, Turning
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,8 +30,7 @@ class Cage:
     ----------
     angle, rate : of ball 1 [rad], [rad/s]
     in_outer, in_inner : angle of ball 1 as the outer and the inner ring see it, which stood along x at the start [rad]
-    inputs : the parts of these angles that grow evenly, at the reference time, none where the driver's angle is a
-        coordinate; and what effects need
+    inputs : the parts of these angles that turn with a known driver, at the reference time; and what effects need
     constants, definitions : of the symbols in these
     spin : angle of a ball's own material that meets the outer raceway, None where no effect asks for it [rad]
     share : of the inner ring's speed in that of the cage, slip included; the rest is that of the outer ring's; a
@@ -40,7 +39,7 @@ class Cage:
         where rings that are loaded one-way turn evenly
     switches : places of the motion at which a ball enters or leaves a spall, where these times are not known before
     lag : coordinate whose velocity is the angle by which the cage lags, and the rate of that [rad/s]; None where the
-        slip does not change, and where rings that are loaded one-way turn evenly
+        slip does not change, and where the rings turn with a known driver
     """
 
     angle: sp.Expr
@@ -62,93 +61,172 @@ def cage_ratio(names: Names) -> sp.Symbol:
     return names.constant("cage_ratio")
 
 
-def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr, *, outer: bool = False) -> Cage:
-    """A ring at constant speed [rad/s], the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Slip:
+    """A slip that changes, and turns of the balls over the ring that it is seen from, in one of the driver."""
+
+    excess: Input
+    rolling: sp.Symbol
+    constants: tuple[Definition, ...]
+
+
+def _slip(bearing: Bearing, names: Names, rolled: sp.Expr) -> _Slip | None:
+    """None where the slip does not change."""
+    excess = excess_slip(bearing, names)
+    if excess is None:
+        return None
+    words = "Turns of the balls over the ring that slip is seen from, in one of the driver, if they rolled"
+    turned = names.define(names.constant("rolling_turns"), rolled, "1", words, "N_c")
+    return _Slip(excess=excess, rolling=turned.symbol, constants=(*lag_at_rows(bearing, names), turned))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    """An angle that turns with a known driver [rad]: it, its turning, and the constants of that."""
+
+    angle: sp.Expr
+    turning: Turning
+    input: Input
+    constants: tuple[Definition, ...]
+
+
+def _known(
+    bearing: Bearing,
+    names: Names,
+    part: str,
+    turns: sp.Expr,
+    drive: KnownDrive | None,
+    slip: _Slip | None,
+    each: sp.Expr = sp.S.One,
+) -> _Known:
+    """Angle of ball 1, or of its material, that makes `turns` turns in one of the driver (`drive` is None: none).
+
+    Parameters
+    ----------
+    part : "cage", "outer_pass" or "inner_pass" for it as a ring sees it, "spin" for its material
+    each : how much the slip of the cage counts
+    """
+    speed = names.constant(f"{part}_speed")
+    of = f" of {bearing.name}" if bearing.name else ""
+    spins = part == "spin"
+    seen = f", as the {part.partition('_')[0]} ring sees it" if part.endswith("_pass") else ""
+    words = f"Angle of ball 1{of} at the reference time{seen}"
+    latex = rf"\psi_{{0,{part[0]}}}" if seen else r"\psi_0"
+    if spins:
+        words, latex = f"{SPIN}{of}, at the reference time", r"\chi_0"
+    turning = Turning(
+        name=f"{bearing.prefix}{part}",
+        kind="spin" if spins else "cage" if part == "cage" else "pass",
+        words=f"the cage of {names.path}",
+        offset=names.constant("spin_start").name if spins else bearing.ball_angle.path,
+        rate=speed.name,
+        parts=1 if spins else bearing.balls,
+    )
+    constants: tuple[Definition, ...] = ()
+    even = drive is None or drive.even
+    if slip is not None or not even:
+        turned = names.define(
+            names.constant(f"{part}_turns"), turns, "1", f"Turns of {part.replace('_', ' ')} in one of the driver", "N"
+        )
+        constants = (turned,)
+        turning = replace(
+            turning,
+            turns=turned.symbol.name,
+            times=() if drive is None else drive.turning.times,
+            speeds=() if drive is None else drive.turning.speeds,
+        )
+    passed = sp.S.Zero if drive is None else drive.passed
+    angle = speed * TIME if even else turns * passed
+    if slip is not None:
+        assert bearing.cage is not None  # its slip changes
+        assert bearing.cage.lag is not None
+        rolling, lag = slip.rolling, symbol_of(bearing.cage.lag)
+        if each != 1:
+            more = (
+                names.define(names.constant(f"{part}_rolling"), each * rolling, "1", f"{rolling.name}, of {part}", "N"),
+                names.define(names.constant(f"{part}_lag"), each * lag, "rad", f"{lag.name}, of {part}", r"\lambda"),
+            )
+            constants, rolling, lag = (*constants, *more), more[0].symbol, more[1].symbol
+        turning = replace(
+            turning,
+            rolling=rolling.name,
+            lag=lag.name,
+            lag_times=tuple(q.path for q in bearing.cage.time),
+            lags=tuple(symbol.name for symbol in lag_names(bearing, names)),
+        )
+        angle -= rolling * slip.excess.symbol * passed
+    start = turning.phase(names.words(words), names.latex(latex))
+    return _Known(angle=start.symbol + angle, turning=turning, input=start, constants=constants)
+
+
+def cage_on_shaft(bearing: Bearing, drive: KnownDrive | None, *, outer: bool = False) -> Cage:
+    """A ring at constant speed, the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
     names = names_of(bearing)
-    turning, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
-    speed, even = names.constant("cage_speed"), _phase(bearing, names)
-    pass_speed, passing = names.constant(f"{turning}_pass_speed"), _phase(bearing, names, turning)
-    rolling = share * shaft_speed
+    shaft_speed = sp.S.Zero if drive is None else drive.speed
+    ring, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
+    speed, pass_speed = names.constant("cage_speed"), names.constant(f"{ring}_pass_speed")
+    turns, slip = kept_share(bearing) * share, _slip(bearing, names, share)
     constants: tuple[Definition, ...] = (
         _ratio(bearing, names),
-        names.define(speed, kept_share(bearing) * rolling, "rad/s", "Speed of the cage", r"\omega_c"),
-        _pass(names, turning, speed - shaft_speed),
+        names.define(speed, turns * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
+        _pass(names, ring, speed - shaft_speed),
         *((_pass(names, "inner", speed),) if outer else ()),
+        *(() if slip is None else slip.constants),
     )
-    lag = lag_of(bearing, names, rolling)
-    behind, ledger, rate = sp.S.Zero, Ledger(), speed
-    if lag is not None:
-        behind, constants = lag.angle, (*constants, *lag.constants)
+    still = _known(bearing, names, "cage", turns, drive, slip)
+    moving = _known(bearing, names, f"{ring}_pass", turns - 1, drive, slip)
+    over_outer, over_inner = (moving, still) if outer else (still, moving)
+    known, ledger, rate = [still, moving], Ledger(), speed
+    if slip is not None:
         words = names.words("speed of the balls about the bearing's axis")
-        rate = ledger.define(f"{bearing.prefix}cage.rate", speed - lag.rate, "rad/s", words, names.latex(r"\dot\psi"))
-    angle = even.symbol + speed * TIME - behind
-    over_turning = passing.symbol + pass_speed * TIME - behind
-    still, moving = (angle, speed), (over_turning, pass_speed)
-    passes = Passing(outer=moving, inner=still, even=True) if outer else Passing(outer=still, inner=moving, even=True)
-    spin = _spin(bearing, names, passes.outer[1], -ball_turns(bearing) * behind) if _spins(bearing) else None
+        slower = speed - slip.rolling * slip.excess.symbol * shaft_speed
+        rate = ledger.define(f"{bearing.prefix}cage.rate", slower, "rad/s", words, names.latex(r"\dot\psi"))
+    spin: _Known | None = None
+    if _spins(bearing):
+        constants += _spin_constants(bearing, names, pass_speed if outer else speed)
+        of_ball = ball_turns(bearing) * (turns - 1 if outer else turns)
+        spin = _known(bearing, names, "spin", of_ball, drive, slip, ball_turns(bearing))
+        known.append(spin)
+    passes = Passing(
+        outer=(over_outer.angle, speed),
+        inner=(over_inner.angle, speed),
+        turnings={"outer": over_outer.turning, "inner": over_inner.turning}
+        | ({} if spin is None else {"spin": spin.turning}),
+    )
     met = _met(bearing, names, passes)
     return Cage(
-        angle=angle,
+        angle=still.angle,
         rate=rate,
-        in_outer=passes.outer[0],
-        in_inner=passes.inner[0],
-        inputs=(
-            even,
-            passing,
-            *(() if spin is None else spin.inputs),
-            *(() if lag is None else lag.inputs),
-            *met.inputs,
-        ),
-        constants=(*constants, *(() if spin is None else spin.constants), *met.constants),
+        in_outer=over_outer.angle,
+        in_inner=over_inner.angle,
+        inputs=(*(one.input for one in known), *(() if slip is None else (slip.excess,)), *met.inputs),
+        constants=(*constants, *(c for one in known for c in one.constants), *met.constants),
         definitions=ledger.definitions,
         spin=None if spin is None else spin.angle,
         share=cage_ratio(names),
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Spin:
-    angle: sp.Expr
-    rate: sp.Expr
-    inputs: tuple[Input, ...]
-    constants: tuple[Definition, ...]
+#: What the angle of a ball's spin is.
+SPIN = "Angle of a ball's material that meets the outer raceway"
 
 
 def _spins(bearing: Bearing) -> bool:
     return any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
 
 
-def _spin(bearing: Bearing, names: Names, over_outer: sp.Expr, swung: sp.Expr) -> _Spin:
+def _spin_constants(bearing: Bearing, names: Names, over_outer: sp.Expr) -> tuple[Definition, ...]:
     """Balls that roll on the outer raceway: as much of their surface passes as of the raceway.
 
     Parameters
     ----------
     over_outer : mean speed of the cage over the outer ring [rad/s]
-    swung : angle that a ball turns beyond the mean [rad]
     """
     start, speed = names.constant("spin_start"), names.constant("spin_speed")
-    words = "Angle of a ball's material that meets the outer raceway"
-    turned = phase(
-        f"{bearing.prefix}spin",
-        f"{words}{f' of {bearing.name}' if bearing.name else ''}, at the reference time",
-        names.latex(r"\chi_0"),
-        offset=start.name,
-        rate=speed.name,
-    )
-    return _Spin(
-        angle=turned.symbol + speed * TIME + swung,
-        rate=speed,
-        inputs=(turned,),
-        constants=(
-            names.define(start, sp.S.Zero, "rad", f"{words} at the start, from which it is counted", r"\chi_{00}"),
-            names.define(
-                speed,
-                ball_turns(bearing) * over_outer,
-                "rad/s",
-                "Speed of the balls about their own axes, seen from the cage",
-                r"\omega_w",
-            ),
-        ),
+    words = "Speed of the balls about their own axes, seen from the cage"
+    return (
+        names.define(start, sp.S.Zero, "rad", f"{SPIN} at the start, from which it is counted", r"\chi_{00}"),
+        names.define(speed, ball_turns(bearing) * over_outer, "rad/s", words, r"\omega_w"),
     )
 
 
@@ -187,20 +265,18 @@ def cage_between(
     weights = (share, 1 - share)
     swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
     turns = sum((w * s.turns for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
-    lag, share_now, behind = lag_state(bearing, names), share, sp.S.Zero
     rolling = cage_ratio(names) - (1 if about_inner else 0)
-    if lag is not None:
+    slip = _slip(bearing, names, rolling * (swings[0].turns - swings[1].turns))
+    share_now = share
+    if slip is not None:
         share_now = ledger.define(
             f"{bearing.prefix}cage.share",
-            share - rolling * lag.excess.symbol,
+            share - rolling * slip.excess.symbol,
             "1",
             "share of the inner ring's speed in that of the cage",
             names.latex(r"\kappa_c(t)"),
         )
-        behind, constants = lag.coordinate.velocity, (*constants, *lag.constants)
-        words = "Turns of the balls over the ring that slip is seen from, in one of the driver, if they rolled"
-        rolled = rolling * (swings[0].turns - swings[1].turns)
-        constants += (names.define(names.constant("rolling_turns"), rolled, "1", words, "N_c"),)
+        constants = (*constants, *slip.constants)
     rate = ledger.define(
         f"{bearing.prefix}cage.rate",
         sum((w * body.rate for w, body in zip((share_now, 1 - share_now), bodies, strict=True)), start=sp.S.Zero),
@@ -222,23 +298,26 @@ def cage_between(
     inner, outer = swings
     apart = inner.swing - inner.at_start - outer.swing + outer.at_start
     around = inner.turns - outer.turns
-    free = drive.coordinate is not None
-    inputs: list[Input] = []
+    known_drive = drive if isinstance(drive, KnownDrive) else None
+    # a lag between rings that turn with a known driver is known; else it is a state
+    evenly = known_drive is not None and all(one.swing == 0 for one in swings)
+    lag = None if slip is None or evenly else lag_coordinate(bearing, names)
+    behind = sp.S.Zero if lag is None else lag.velocity
+    known: list[_Known] = []
 
     def ball(part: str, turns: sp.Expr, swung: sp.Expr) -> sp.Expr:
         """Angle of ball 1, of which so many turns go with the driver's."""
-        if free:
+        if known_drive is None:
             return symbol_of(bearing.ball_angle) + turns * (drive.angle - start) + swung - behind
-        inputs.append(_phase(bearing, names, part))
-        speed = names.constant(f"{part}_pass_speed" if part else "cage_speed")
-        return inputs[-1].symbol + speed * TIME + swung - behind
+        known.append(_known(bearing, names, part, turns, known_drive, slip if evenly else None))
+        return known[-1].angle + swung - behind
 
-    angle, in_outer, over_outer = ball("", turns, swung), None, speed
+    angle, in_outer, over_outer = ball("cage", turns, swung), None, speed
     if outer is not STILL:
         constants += (_pass(names, "outer", share * names.constant("ring_speed")),)
-        in_outer, over_outer = ball("outer", share * around, share * apart), names.constant("outer_pass_speed")
+        in_outer, over_outer = ball("outer_pass", share * around, share * apart), names.constant("outer_pass_speed")
     constants += (_pass(names, "inner", (share - 1) * names.constant("ring_speed")),)
-    in_inner = ball("inner", (share - 1) * around, (share - 1) * apart)
+    in_inner = ball("inner_pass", (share - 1) * around, (share - 1) * apart)
     ring_rate: sp.Symbol | None = None
     if bearing.effects or lag is not None:
         ring_rate = ledger.define(
@@ -253,39 +332,45 @@ def cage_between(
         rate=rate,
         in_outer=angle if in_outer is None else in_outer,
         in_inner=in_inner,
-        inputs=(*inputs, *(() if lag is None else (lag.excess,))),
-        constants=constants,
+        inputs=(*(one.input for one in known), *(() if slip is None else (slip.excess,))),
+        constants=(*constants, *(c for one in known for c in one.constants)),
         definitions=ledger.definitions,
         share=share_now,
-        lag=None if lag is None or ring_rate is None else (lag.coordinate, rolling * lag.excess.symbol * ring_rate),
+        lag=None
+        if lag is None or slip is None or ring_rate is None
+        else (lag, rolling * slip.excess.symbol * ring_rate),
     )
     if not bearing.effects:
         return cage
     assert ring_rate is not None  # of effects
-    rolls, spin = ball_turns(bearing), None
+    rolls, spin, inputs = ball_turns(bearing), None, cage.inputs
+    constants = cage.constants
+    turnings = {one.turning.name.removeprefix(bearing.prefix).removesuffix("_pass"): one.turning for one in known}
+    if evenly and outer is STILL:
+        turnings["outer"] = turnings["cage"]
     if _spins(bearing):
-        spin = _spin(bearing, names, over_outer, rolls * (share * apart - behind))
-        constants += spin.constants
-        if free:
-            turned = share * (around * (drive.angle - start) + apart) - behind
-            spin = replace(spin, angle=rolls * turned, inputs=())
-    even = not free and lag is None and all(one.swing == 0 for one in swings)
-    known = (over_outer, names.constant("inner_pass_speed"))
-    if not even:
-        known = (share_now * ring_rate, (share_now - 1) * ring_rate)
+        constants += _spin_constants(bearing, names, over_outer)
+        turned = share * (around * (drive.angle - start) + apart) - behind
+        spin = rolls * turned
+        if known_drive is not None:
+            over = _known(bearing, names, "spin", rolls * share * around, known_drive, slip if evenly else None, rolls)
+            spin = over.angle + rolls * (share * apart - behind)
+            inputs, constants = (*inputs, over.input), (*constants, *over.constants)
+            turnings["spin"] = over.turning
+    rates = (share_now * ring_rate, (share_now - 1) * ring_rate)
     passes = Passing(
-        outer=(cage.in_outer, known[0]),
-        inner=(in_inner, known[1]),
-        spin=None if spin is None else (spin.angle, spin.rate if even else rolls * known[0]),
-        even=even,
+        outer=(cage.in_outer, rates[0]),
+        inner=(in_inner, rates[1]),
+        spin=None if spin is None else (spin, rolls * rates[0]),
+        turnings=turnings if evenly else None,
     )
     met = _met(bearing, names, passes)
     return replace(
         cage,
-        inputs=(*cage.inputs, *(() if spin is None else spin.inputs), *met.inputs),
+        inputs=(*inputs, *met.inputs),
         constants=(*constants, *met.constants),
         definitions=(*ledger.definitions, *met.definitions),
-        spin=None if spin is None else spin.angle,
+        spin=spin,
         ring_rate=ring_rate,
         switches=met.switches,
     )
@@ -314,16 +399,4 @@ def _ratio(bearing: Bearing, names: Names) -> Definition:
         "1",
         "Speed of the cage over speed of the inner ring, " + ("r_b/(R_b + r_b), Eq. (7)" if given is None else "given"),
         r"\omega_c/\omega",
-    )
-
-
-def _phase(bearing: Bearing, names: Names, ring: str = "") -> Input:
-    """Angle of ball 1 at the reference time, as a ring sees it; "" in axes that stand still."""
-    seen = f", as the {ring} ring sees it" if ring else ""
-    return phase(
-        f"{bearing.prefix}{f'{ring}_pass' if ring else 'cage'}",
-        names.words(f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time{seen}"),
-        names.latex(rf"\psi_{{0,{ring[0]}}}" if ring else r"\psi_0"),
-        offset=bearing.ball_angle.path,
-        rate=f"{bearing.path}.{f'{ring}_pass' if ring else 'cage'}_speed",
     )

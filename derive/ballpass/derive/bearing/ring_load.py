@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.drive.constant_speed import ConstantSpeed
+from ballpass.derive.drive import KnownDrive, shaft_drive
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber
@@ -22,12 +22,11 @@ from ballpass.derive.scene.records import (
     Load,
     LoadWindow,
     Scene,
-    Shaft,
     TableLoad,
     UnbalanceLoad,
 )
 from ballpass.derive.terms import TIME, Definition, components, symbol_of
-from ballpass.derive.variables import Input, phase
+from ballpass.derive.variables import Input, Turning
 
 #: How long a load without an end acts, longer than any run [s].
 FOR_EVER = 10**9
@@ -56,7 +55,7 @@ def reaction_share(scene: Scene, bearing: Bearing, reactions: Reactions) -> Ring
 
 def own_loads(scene: Scene) -> RingLoad:
     """Sum of the loads that a scene gives itself; every bearing of the scene carries it."""
-    shaft = _shaft(scene.shaft) if scene.shaft is not None and any(load.turns for load in scene.loads) else None
+    shaft = shaft_drive(scene.shaft) if scene.shaft is not None and any(load.turns for load in scene.loads) else None
     parts = [] if shaft is None else [_turning(shaft)]
     for load in scene.loads:
         assert shaft is not None or not load.turns  # the reader refuses these beside a mechanism
@@ -76,29 +75,10 @@ def _sum(parts: Iterable[RingLoad]) -> RingLoad:
     return total
 
 
-def _shaft(shaft: Shaft) -> ConstantSpeed:
-    """The shaft's angle, zero at t = 0."""
-    start = phase(
-        "shaft",
-        "Angle of the shaft at the reference time",
-        r"\theta_0",
-        offset="shaft.start_angle",
-        rate=shaft.speed.path,
-    )
-    return ConstantSpeed(
-        angle=sp.Symbol("shaft.angle", real=True),
-        speed=symbol_of(shaft.speed),
-        acceleration=sp.S.Zero,
-        description="the shaft's speed is constant",
-        inputs=(start,),
-        phase=start,
-    )
-
-
-def _turning(shaft: ConstantSpeed) -> RingLoad:
+def _turning(shaft: KnownDrive) -> RingLoad:
     """What the loads that follow the shaft's angle share: no force."""
     zero = Definition(
-        symbol=sp.Symbol(shaft.phase.offset, real=True),
+        symbol=sp.Symbol(shaft.turning.offset, real=True),
         expression=sp.S.Zero,
         unit="rad",
         description="Angle of the shaft at t = 0",
@@ -106,7 +86,7 @@ def _turning(shaft: ConstantSpeed) -> RingLoad:
     )
     angle = Definition(
         symbol=shaft.angle,
-        expression=shaft.phase.symbol + shaft.speed * TIME,
+        expression=shaft.inputs[0].symbol + shaft.passed,
         unit="rad",
         description="Angle of the shaft",
         latex=r"\theta",
@@ -114,7 +94,7 @@ def _turning(shaft: ConstantSpeed) -> RingLoad:
     return RingLoad(force=(sp.S.Zero, sp.S.Zero), inputs=shaft.inputs, constants=(zero,), definitions=(angle,))
 
 
-def _unwindowed(load: Load, shaft: ConstantSpeed | None) -> RingLoad:
+def _unwindowed(load: Load, shaft: KnownDrive | None) -> RingLoad:
     law = load.law
     if isinstance(law, ConstantLoad):
         return RingLoad(force=components(law.force))
@@ -126,7 +106,7 @@ def _unwindowed(load: Load, shaft: ConstantSpeed | None) -> RingLoad:
     return _over_time(load, law) if law.over == "time" else _over_angle(load, law, shaft)
 
 
-def _windowed(load: Load, full: RingLoad, shaft: ConstantSpeed | None) -> RingLoad:
+def _windowed(load: Load, full: RingLoad, shaft: KnownDrive | None) -> RingLoad:
     """The load times 1 within its windows and 0 outside."""
     if load.angle_window is not None and load.angle_window.end is not None:
         assert shaft is not None
@@ -172,7 +152,7 @@ def _within_times(load: Load, window: LoadWindow, full: RingLoad) -> RingLoad:
     return _times(gate.symbol, full, (gate,), constants)
 
 
-def _unbalance(load: Load, law: UnbalanceLoad, shaft: ConstantSpeed) -> RingLoad:
+def _unbalance(load: Load, law: UnbalanceLoad, shaft: KnownDrive) -> RingLoad:
     """Centrifugal force m_u e_u omega^2 of a mass that turns with the shaft."""
     amount = Definition(
         symbol=sp.Symbol(f"{load.path}.centrifugal_force", real=True),
@@ -197,13 +177,13 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
 
     def wave(ending: str, at_start: SceneNumber, words: str) -> tuple[Input, Definition]:
         axis = ending.removeprefix(".")
-        turning = phase(
-            f"{load.label}{ending}",
-            words,
-            rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0",
+        turning = Turning(
+            name=f"{load.label}{ending}",
+            kind="load",
+            words=f"load {load.name}" if load.name else "load",
             offset=at_start.path,
             rate=angular.symbol.name,
-        )
+        ).phase(words, rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0")
         harmonic = Definition(
             symbol=sp.Symbol(f"{load.label}.wave{ending}", real=True),
             expression=sp.cos(turning.symbol + angular.symbol * TIME),
@@ -227,7 +207,7 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
     )
 
 
-def _over_angle(load: Load, law: TableLoad, shaft: ConstantSpeed | None) -> RingLoad:
+def _over_angle(load: Load, law: TableLoad, shaft: KnownDrive | None) -> RingLoad:
     assert shaft is not None
     angles = [q.path for q in law.rows]
     x, y = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.drive.drive import Drive, OverAngle, parts_of_knots
+from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
@@ -47,8 +47,7 @@ class AngleState(Drive):
             latex=rf"T_{{\mathrm{{{name}}}}}",
         )
         kinks = ((f"{name}.table", Smoothness.KINKED),)
-        parts = parts_of_knots(name, angles, turns)
-        return OverAngle(value=value.symbol, constants=parts, definitions=(behind, value), smoothness=kinks)
+        return OverAngle(value=value.symbol, definitions=(behind, value), smoothness=kinks)
 
 
 def window_gate(

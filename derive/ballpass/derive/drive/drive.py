@@ -71,20 +71,3 @@ class Drive(ABC):
         ----------
         angles, values : names of parameters, in [rad] and `unit`
         """
-
-
-def part_of(name: str, place: str, unit: str, words: str, path: str, turns: int) -> Definition:
-    """Constant of a table over several turns: a number divided by these."""
-    return Definition(
-        symbol=sp.Symbol(f"{name}.{place}", real=True),
-        expression=sp.Symbol(path, real=True) / turns,
-        unit=unit,
-        description=f"{words} of the table of {name}, over its {turns} turns",
-        latex=rf"\mathrm{{{place.replace('_', ' ')}}}_{{\mathrm{{{name}}}}}",
-    )
-
-
-def parts_of_knots(name: str, angles: Sequence[str], turns: int) -> tuple[Definition, ...]:
-    """The knots of a table over several turns, divided by these: they show after how many the loads repeat."""
-    numbered = enumerate(angles, start=1) if turns > 1 else ()
-    return tuple(part_of(name, f"part_angle_{k}", "rad", f"Angle {k}", path, turns) for k, path in numbered)

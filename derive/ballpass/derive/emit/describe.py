@@ -48,7 +48,10 @@ def describe(
         states=tuple(info_of(mf.VariableInfo, s) for s in system.states),
         coordinates=tuple(info_of(mf.CoordinateInfo, c, velocity=c.velocity.name) for c in system.coordinates),
         initial=system.initial,
-        inputs=tuple(info_of(mf.InputInfo, i) for i in system.inputs),
+        turnings=tuple(info_of(mf.TurningInfo, t) for t in system.turnings),
+        inputs=tuple(
+            info_of(mf.InputInfo, i, turning="" if i.turning is None else i.turning.name) for i in system.inputs
+        ),
         outputs=tuple(info_of(mf.VariableInfo, o, size=_size(system, o)) for o in system.outputs),
         quantities=tuple(
             info_of(mf.QuantityInfo, o, size=_size(system, o), group=g.name)
@@ -100,6 +103,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         angle=driven.name if driven is not None else "",
         rate=driven.velocity.name if driven is not None else "",
         driver=mechanism.driver.joint,
+        turns=tuple((f.label, f.law.turns) for f in mechanism.forces if getattr(f.law, "turns", 1) > 1),
         springs=drawn_springs(mechanism),
     )
 
@@ -109,7 +113,6 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
     driven = system.linkage.driven if system.linkage is not None else ""
     laws = [dict(bearing.laws).get("damping") for bearing in system.bearings]
-    constants = {constant.symbol.name for constant in system.constants}
     return tuple(
         mf.BearingInfo(
             name=bearing.name,
@@ -134,7 +137,6 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             alignment=alignment_info(bearing),
             element=bearing.element,
             inner_stands=bearing.inner_body == FRAME or (scene.shaft is not None and scene.shaft.ring == "outer"),
-            inner_turns=turns if (turns := f"body.{bearing.inner_body}.turns") in constants else "",
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

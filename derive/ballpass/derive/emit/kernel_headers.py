@@ -134,10 +134,8 @@ def _bearing(index: int, bearings: tuple[BallKernels, ...], life: ElementLife) -
 
 
 def _load_powers(life: ElementLife) -> dict[str, int]:
-    """Exponents of the loads that damage a turning and a standing ring, and what makes damage of the latter's mean."""
-    powers = {"TURNING": life.turning, "STANDING": life.standing, "DAMAGE": 1 / life.weibull}
-    fractions = ((name, power.numerator, power.denominator) for name, power in powers.items())
-    return {key: value for name, p, q in fractions for key, value in ((name, p), (f"{name}_BY", q))}
+    """Exponent of the loads that damage a ring, a fraction."""
+    return {"TURNING": life.turning.numerator, "TURNING_BY": life.turning.denominator}
 
 
 def _of_balls(function: ca.Function, index: int, words: str) -> str:

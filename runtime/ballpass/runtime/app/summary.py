@@ -39,9 +39,9 @@ from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.failure_location import ring_distances
 from ballpass.runtime.run.settle import MEANS, PEAKS
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.ask.observables import SignalStatistics
@@ -268,7 +268,7 @@ def _drive_work(model: Model, sol: Solution) -> float | None:
     None where the driver's speed changes, or makes no whole turn.
     """
     mechanism, numbers = sol.manifest.mechanism, model.numbers(sol.parameters)
-    if mechanism is None or mechanism.angle or sol.period is None:
+    if mechanism is None or sol.period is None:
         return None
     run = run_of(model, numbers, sol)
     window = whole_cycles(run)
@@ -340,9 +340,7 @@ def _constants(sol: Solution) -> dict[str, Any]:
             if name in units:
                 found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])
         speed = _number(sol, bearing.ring_speed)
-        mechanism = sol.manifest.mechanism
-        even = mechanism is None or not mechanism.angle
-        if even and speed != 0.0:  # rings that only swing against each other pass no ball
+        if sol.period is not None and speed != 0.0:  # rings that only swing against each other pass no ball
             values = mean_speeds(sol)
             frequencies = frequencies_of(bearing, values)
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}

@@ -17,7 +17,7 @@ from ballpass.runtime.ratings.elements import RatedElement
 from ballpass.runtime.ratings.of_bearing import bearing_words, contacts_of, rated_element
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.short_words import short_words
-from ballpass.runtime.run.driver_angle import crank_angle
+from ballpass.runtime.time.timeline import crank_angle, is_free
 
 #: Words of what the summary adds to states, outputs and constants; those of one bearing of several name it.
 _ADDED = {
@@ -109,7 +109,7 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
             continue
         force, time = peak["total"], peak["time"]["total"]
         place = f"{rated_element(bearing).noun} {peak['ball']['total']} at {time:.5g} s"
-        if manifest.mechanism is None or not manifest.mechanism.angle:
+        if not is_free(manifest):
             turning = "crank" if manifest.mechanism is not None else "shaft"
             place += f", {turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
         pressure, ring = max(

@@ -16,12 +16,12 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.beats import beats
-from ballpass.runtime.run.driver_angle import cycle_turns
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats, tolerated
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.timeline import cycle_turns
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -54,12 +54,12 @@ def warnings_of_transient(
 
 def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
     """A sentence where turns that a scene without a run takes lie behind rows of tables, or are no load's period."""
-    settings, turn = model.run_settings, driver_angle.period(model.manifest, values)
+    settings, turn = model.run_settings, timeline.period(model.manifest, values)
     if settings.stated or settings.cycles is None or not math.isfinite(turn):
         return []
     begin = settings.transient_cycles * turn
-    rows = driver_angle.rows_over_time(model.manifest, values, 0.0, begin)
-    slowest, length = driver_angle.longest_harmonic(model.manifest, values), settings.cycles * turn - begin
+    rows = timeline.rows_over_time(model.manifest, values, 0.0, begin)
+    slowest, length = timeline.longest_harmonic(model.manifest, values), settings.cycles * turn - begin
     if not len(rows) and slowest > length * (1.0 + 1e-9):
         return [
             f"turns {settings.transient_cycles:g} to {settings.cycles:g}, which a scene without a run takes, are "
@@ -112,7 +112,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
 
 def _part_of_cycle(run: Run) -> list[str]:
     """A warning about means of a run that ends within the turns after which all loads repeat."""
-    cycle = cycle_turns(run.numbers.values)
+    cycle = cycle_turns(run.model.manifest)
     turns = (run.end - run.start) / run.turn
     if cycle == 1 or math.isclose(turns, cycle * round(turns / cycle), rel_tol=1e-9):
         return []

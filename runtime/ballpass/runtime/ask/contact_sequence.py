@@ -24,13 +24,13 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges
 from ballpass.runtime.quantity.track import ChannelValues, follow
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.loop import segments_of, steps_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.time.turning import TURN
 
 #: Parts of a step at whose ends contacts are evaluated.
 PARTS = 4
@@ -182,7 +182,7 @@ def _deflections(
 def _shifts(model: LoadedModel, numbers: Numbers, state: np.ndarray, length: float) -> list[int]:
     """For each bearing: after a period ball k stands where ball k + shift stood."""
     first, last = (ball_angles(model, numbers, time, state) for time in (0.0, length))
-    return [round(float(b[0] - a[0]) * len(a) / driver_angle.TURN) % len(a) for a, b in zip(first, last, strict=True)]
+    return [round(float(b[0] - a[0]) * len(a) / TURN) % len(a) for a, b in zip(first, last, strict=True)]
 
 
 def _margin(table: np.ndarray, shift: int) -> float:

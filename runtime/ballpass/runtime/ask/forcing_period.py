@@ -18,13 +18,14 @@ import numpy as np
 
 from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import InputInfo, Manifest
+from ballpass.runtime.contract.manifest import InputInfo, Manifest, TurningInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import STEP, TURN, Turning
 
 #: Two rates are commensurable where a fraction with at most this denominator meets their ratio so closely [1].
 LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
@@ -46,27 +47,38 @@ class ForcingPeriod:
 
     Attributes
     ----------
-    rate : parameter or constant, the rate of what fixes the period [rad/s]
+    turning : what fixes the period
     count : turns of it in a period; a fraction where balls take each other's places
     words : what happens in a period
     difference : of the accelerations at one state a period apart, relative to the largest [1]
     """
 
-    rate: str
+    turning: TurningInfo
     count: Fraction | float
     words: str
     difference: float
 
     def time(self, values: Mapping[str, float]) -> float:
         """The period for these numbers of the model [s]."""
-        return float(self.count) * driver_angle.TURN / abs(values[self.rate])
+        return float(self.count) * TURN / abs(_rate(self.turning, values))
+
+    def slope(self, values: Mapping[str, float], moved: Mapping[str, float]) -> float:
+        """Derivative of the period along a direction of the numbers [s/unit]."""
+        rate = Turning.of(self.turning, timeline.along(values, moved)).rate[-1]
+        return float(-self.time(values) * np.imag(rate) / STEP / np.real(rate))
+
+
+def _rate(info: TurningInfo, values: Mapping[str, float]) -> float:
+    """Rate of a turning behind its last row [rad/s]."""
+    return float(Turning.of(info, values).rate[-1])
 
 
 def refuse_free_driver(manifest: Manifest, question: str) -> None:
     """Refuse a scene where the driver's motion or a cage's lag is a state: no period."""
-    if manifest.mechanism is not None and manifest.mechanism.angle:
+    if timeline.is_free(manifest):
         raise RequestError(
-            f"{question}: the driver's motion is a state in this scene. Allowed: a driver or shaft at constant speed."
+            f"{question}: a torque drives in this scene, and the driver's motion is a state. Allowed: a driver or "
+            "shaft whose speed is given."
         )
     if any(coordinate.kind == "lag" for coordinate in manifest.coordinates):
         raise RequestError(
@@ -77,11 +89,11 @@ def refuse_free_driver(manifest: Manifest, question: str) -> None:
 
 def refuse_changing(manifest: Manifest, values: Mapping[str, float], question: str, begin: float, end: float) -> None:
     """Refuse points between two times [s] of turns that a table over time makes unlike each other."""
-    if driver_angle.changes_over_time(manifest, values, begin, end):
+    if timeline.changes_over_time(manifest, values, begin, end):
         raise RequestError(
-            f"{question}: a load or slip follows a table or a window over time, with rows between {begin:.4g} s and "
-            f"{end:.4g} s, from where points are taken: turns there are unlike each other. Allowed: points behind the "
-            "last row (settling)."
+            f"{question}: a load, speed or slip follows a table or a window over time, with rows between {begin:.4g} s "
+            f"and {end:.4g} s, from where points are taken: turns there are unlike each other. Allowed: points behind "
+            "the last row (settling)."
         )
 
 
@@ -100,12 +112,12 @@ def forcing_period(
     RequestError
         What turns has no common period, or nothing changes with time.
     """
-    _refuse_tables(model)
+    _refuse_tables(model, numbers, times)
     if turns is not None:
-        speed = driver_angle.speed_name(model.manifest)
-        if speed is None or numbers.values[speed] == 0.0:
+        driver = timeline.driver_info(model.manifest)
+        if driver is None or _rate(driver, numbers.values) == 0.0:
             raise RequestError("turns: nothing turns in this scene. Leave it away.")
-        asked = ForcingPeriod(rate=speed, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
+        asked = ForcingPeriod(turning=driver, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
         return _checked(model, numbers, times, states, asked)
     rates = _rates(model, numbers, times, states)
     if not rates:
@@ -114,27 +126,28 @@ def forcing_period(
             "ballpass linearize."
         )
     (base, order), *others = rates.items()
-    ratios = {name: abs(numbers.values[name]) * n / (abs(numbers.values[base]) * order) for name, n in others}
-    near = {name: Fraction(ratio).limit_denominator(LARGEST_DENOMINATOR) for name, ratio in ratios.items()}
-    for name, ratio in ratios.items():
-        if abs(near[name] - ratio) > EXACT * ratio:
-            raise RequestError(_two_periods(base, name, ratio * order / rates[name]))
+    speed = {info: abs(_rate(info, numbers.values)) for info in rates}
+    ratios = {info: float(speed[info] * n / (speed[base] * order)) for info, n in others}
+    near = {info: Fraction(ratio).limit_denominator(LARGEST_DENOMINATOR) for info, ratio in ratios.items()}
+    for info, ratio in ratios.items():
+        if abs(near[info] - ratio) > EXACT * ratio:
+            raise RequestError(_two_periods(base.rate, info.rate, float(ratio * order / rates[info])))
     whole = math.lcm(*(one.denominator for one in near.values()))
     # one ball that differs, or rings whose shapes turn with the balls, need more than a ball pitch
-    for several in range(1, max(rates.values()) + 1):
-        count = Fraction(whole * several, order)
+    for several in range(1, int(max(rates.values())) + 1):
+        count = whole * several / order
         words = "; ".join(
-            _turned(name, count * (near[name] * order / n if name in near else 1), n) for name, n in rates.items()
+            _turned(info, count * (near[info] * order / n if info in near else 1), n) for info, n in rates.items()
         )
         words = bearing_words(words, model.manifest.bearings)
         found = _checked(
-            model, numbers, times, states, ForcingPeriod(rate=base, count=count, words=words, difference=0.0)
+            model, numbers, times, states, ForcingPeriod(turning=base, count=count, words=words, difference=0.0)
         )
         if found.difference <= SAME:
             return found
     raise RequestError(
-        f"steady: no period was found: after {float(count):g} turns of {base} the accelerations at one state differ by "
-        f"{rounded(100.0 * found.difference, 2)} %. Give the period yourself: turns."
+        f"steady: no period was found: after {float(count):g} turns of {base.rate} the accelerations at one state "
+        f"differ by {rounded(100.0 * found.difference, 2)} %. Give the period yourself: turns."
     )
 
 
@@ -185,48 +198,43 @@ def phase_drifts(
         rates = _rates(model, numbers, times, states)
     except RequestError:  # what follows a table over time has no phase
         return found
-    for rate, alike in rates.items():
-        rounds = abs(numbers.values[rate]) * alike * every / driver_angle.TURN
+    for info, alike in rates.items():
+        rounds = abs(_rate(info, numbers.values)) * float(alike) * every / TURN
         if abs(rounds - round(rounds)) > EXACT * rounds:
-            found[rate] = rounds % 1.0
+            found[info.rate] = rounds % 1.0
     return found
 
 
 def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
     """What else turns than a bearing's cage and stands elsewhere after each time, as for `phase_drifts`."""
-    return [rate for rate in phase_drifts(model, numbers, times, states, every) if _alike(model, rate) == 1]
+    alike = {info.rate for info in model.manifest.turnings if info.parts > 1}
+    return [rate for rate in phase_drifts(model, numbers, times, states, every) if rate not in alike]
 
 
-def _refuse_tables(model: LoadedModel) -> None:
-    for item in model.manifest.inputs:
-        if (item.times and not item.rate) or (item.kind == "gate" and item.times):
-            raise RequestError(
-                f"steady: {item.name} follows a table over time, which has no period. Allowed: loads and speeds that "
-                "are constant or turn evenly."
-            )
+def _refuse_tables(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> None:
+    first = float(np.min(times))
+    if timeline.settled_after(model.manifest, numbers.values) > first + timeline.TIME_RESOLUTION * abs(first):
+        raise RequestError(
+            "steady: a load, speed or slip follows a table over time that goes on behind the moments that are looked "
+            f"at ({first:.4g} s), which has no period. Allowed: moments behind its last row, rows of equal values."
+        )
 
 
-def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[str, int]:
-    """Rates that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls."""
-    _refuse_tables(model)
-    found: dict[str, int] = {}
+def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[TurningInfo, Fraction]:
+    """What turns that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls:
+    a part of one where loads repeat after several."""
+    _refuse_tables(model, numbers, times)
+    found: dict[TurningInfo, Fraction] = {}
     for k, item in enumerate(model.manifest.inputs):
-        if item.rate and numbers.values[item.rate] != 0.0 and _matters(model, numbers, times, states, k, item):
-            found.setdefault(item.rate, _alike(model, item.rate))
-    speed = driver_angle.speed_name(model.manifest)
-    return dict(sorted(found.items(), key=lambda one: one[0] != speed))
-
-
-def _alike(model: LoadedModel, rate: str) -> int:
-    """Into how many parts that look alike a turn of a rate falls: the balls of the bearing whose cage it turns."""
-    for bearing in model.manifest.bearings:
-        if rate in (
-            f"{bearing.path}.cage_speed",
-            f"{bearing.path}.inner_pass_speed",
-            f"{bearing.path}.outer_pass_speed",
-        ):
-            return bearing.balls
-    return 1
+        if not item.turning or item.kind in ("angle", "rate", "slope"):
+            continue
+        info = timeline.info_of(model.manifest, item)
+        if _rate(info, numbers.values) != 0.0 and _matters(model, numbers, times, states, k, item):
+            turns = item.turns if item.turns > 1 else 1
+            parts = Fraction(1, turns) if turns > 1 else Fraction(info.parts)
+            known = found.get(info, parts)
+            found[info] = Fraction(1, math.lcm(known.denominator, turns)) if known.denominator * turns > 1 else known
+    return dict(sorted(found.items(), key=lambda one: one[0].kind != "driver"))
 
 
 def _matters(
@@ -259,16 +267,11 @@ def _checked(
     )
     largest = max(float(np.max(np.abs(first))), 1e-300)
     difference = float(np.max(np.abs(later - first))) / largest
-    return ForcingPeriod(rate=period.rate, count=period.count, words=period.words, difference=difference)
+    return ForcingPeriod(turning=period.turning, count=period.count, words=period.words, difference=difference)
 
 
-#: What turns, by its speed.
-_TURNING = {"mechanism.driver.speed": "the driver", "shaft.speed": "the shaft"}
-
-
-def _turned(rate: str, turns: Fraction, alike: int) -> str:
-    path, _, kind = rate.rpartition(".")
-    name = f"the cage of {path}" if kind == "cage_speed" else _TURNING.get(rate, rate)
+def _turned(info: TurningInfo, turns: Fraction, alike: Fraction) -> str:
+    name = info.rate if info.kind in ("pass", "spin", "load") else info.words
     if alike > 1 and turns.denominator > 1:
         pitches = turns * alike
         return f"{name} turns by {_count(pitches, 'ball pitch', 'ball pitches')}, balls renumbered by {pitches % alike}"

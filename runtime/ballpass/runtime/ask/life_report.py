@@ -35,9 +35,10 @@ from ballpass.runtime.ratings.of_bearing import (
 from ballpass.runtime.ratings.oscillation import Oscillation, oscillation
 from ballpass.runtime.ratings.tilt import Tilt, free_tilt, shaft_slope
 from ballpass.runtime.ratings.wear import COEFFICIENTS
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.load_history import LoadHistory, load_history
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 
 def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Request) -> LifeReport:
@@ -63,8 +64,8 @@ def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Re
 
 def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo, request: Request) -> StateStrength:
     numbers = model.numbers(parameters)
-    moving = model.numbers({**parameters, **driver_angle.set_moving(model.manifest, numbers.values)})
-    if state.name and driver_angle.shaft_speed(model.manifest, moving.values) == 0.0:
+    moving = model.numbers({**parameters, **timeline.set_moving(model.manifest, numbers.values)})
+    if state.name and timeline.shaft_speed(model.manifest, moving.values) == 0.0:
         return StateStrength(
             name=state.name, share=state.share, bearings=(), turns=None, change=0.0, settled=True, samples=0
         )
@@ -97,8 +98,7 @@ def _bearing(
     ratings = ratings_of(info, values)
     peak = history.peaks[info.prefix]
     force, nominal = max(peak.maximum, 0.0), float(geometry_of(info, values).nominal_cosine)
-    uneven = manifest.mechanism is not None and manifest.mechanism.angle
-    turning = driver_angle.shaft_speed(manifest, moving)
+    turning = timeline.shaft_speed(manifest, moving)
     why = why_no_life(info, moving, turning)
     # of a shaft that carries the outer ring, `ring_speed` is that ring's
     sense = -moving[info.ring_speed] if info.inner_stands and not info.joint else moving[info.ring_speed]
@@ -119,7 +119,7 @@ def _bearing(
         peak_force=force,
         peak_time=peak.maximum_time,
         peak_ball=int(peak.maximum_ball or 0),
-        peak_angle=None if uneven else driver_angle.crank_angle(manifest, values, peak.maximum_time),
+        peak_angle=None if timeline.is_free(manifest) else timeline.crank_angle(manifest, values, peak.maximum_time),
         static_safety=static_safety(info.balls, float(ratings.static), force * nominal),
         inner=inner,
         outer=outer,
@@ -228,7 +228,7 @@ def _rings(
             minor_axis=float(along),
             equivalent_load=float(loads[k]) if turns else None,
             damage=tuple((damage[k] / total).tolist()) if turns and total > 0.0 else (),
-            worst_angle=driver_angle.TURN * int(np.argmax(fields[k])) / SECTORS,
+            worst_angle=TURN * int(np.argmax(fields[k])) / SECTORS,
             wear=(COEFFICIENTS[0] * worn, COEFFICIENTS[1] * worn),
             wear_angle=angle,
             wear_across=off,
@@ -281,7 +281,7 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         damage = sum(share / each for share, each in zip(shares, spent, strict=True))
         total = 1.0 / damage if damage > 0.0 else math.inf
         speed = sum(share * abs(bearing.speed) for share, (_, bearing) in zip(shares, lasting, strict=True))
-        return total, total * 3600.0 * speed / driver_angle.TURN
+        return total, total * 3600.0 * speed / TURN
 
     lives = [bearing.life for _, bearing in lasting if bearing.life is not None]
     spent, turns = together(lives)

@@ -11,7 +11,8 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import parse_quantity as parse_quantity_name
-from ballpass.runtime.run.driver_angle import TURN
+from ballpass.runtime.time.timeline import is_even
+from ballpass.runtime.time.turning import TURN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,7 @@ def _speed(
     manifest, values = model.manifest, model.numbers(parameters).values
     ring = next(one for one in manifest.bearings if one.prefix + "ball.force" == channel).ring_speed
     others = (model.numbers({**parameters, one: values[one] * 1.01 + 1e-9}).values[ring] for one in varied)
-    if (manifest.mechanism is not None and manifest.mechanism.angle) or any(one != values[ring] for one in others):
+    if not is_even(manifest, values) or any(one != values[ring] for one in others):
         raise RequestError(
             f"{option}: hours are turns by the speed, which is not one number here. Give turns, as in "
             '"life >= 1e9 turns".'

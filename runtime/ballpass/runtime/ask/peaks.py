@@ -25,10 +25,10 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.time import timeline
 
 Kind = Literal["max", "min"]
 
@@ -124,7 +124,7 @@ def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
         numbers=numbers,
         begin=statistics.begin,
         end=float(solution.t[-1]),
-        turn=driver_angle.period(model.manifest, numbers.values),
+        turn=timeline.period(model.manifest, numbers.values),
         turns=None,
         transient_cycles=0.0,
         start=float(solution.t[0]),

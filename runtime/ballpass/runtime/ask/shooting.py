@@ -22,13 +22,14 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import sensitivities
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Most iterations, and halvings of a step that does not lessen what is left.
 ITERATIONS, HALVINGS = 20, 5
@@ -148,7 +149,7 @@ class Shooting:
         later = 0.0
         if self.over:  # where the period is a function of the parameter, so are the ends of all segments
             chain = Chain(model, numbers, [self.over])
-            later = -length * float(chain.derivative(self.period.rate)[0]) / numbers.values[self.period.rate]
+            later = self.repeats * self.period.slope(numbers.values, chain.moved_numbers[0])
         left = np.empty_like(nodes)
         by_parameter = np.zeros_like(nodes)
         by_states = np.zeros((self.segments, count, self.segments, count))
@@ -252,7 +253,7 @@ class Shooting:
 
 def _rate(model: LoadedModel, numbers: Numbers, t: float, x: np.ndarray, side: float) -> np.ndarray:
     """Derivative of the state by time, just behind (side above 0) or just before a time at which a load may switch."""
-    aside = t + side * 1e-9 * max(t, 1e-9 * driver_angle.TURN)
+    aside = t + side * 1e-9 * max(t, 1e-9 * TURN)
     there = point(model, numbers, t, x)
-    there["u"] = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t, aside)
+    there["u"] = timeline.inputs_at(model.manifest, numbers.values, t, aside)
     return np.array(model.kernel("rhs")(there))

@@ -16,10 +16,11 @@ from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.ratings.life import combined_load
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contact_cosine
 from ballpass.runtime.ratings.wear import depth_of_pass
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.loop import Samples, start_run
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.segments import time_resolution
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
 
@@ -100,12 +101,10 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
     states = samples.x
     names = ("ball.force", "ring_force.x", "ring_force.y", "cage.in_outer", "cage.in_inner")
     channels = ChannelValues(model, [b.prefix + name for b in manifest.bearings for name in names])
-    inputs = driver_angle.inputs_over(manifest.inputs, numbers.values, time, time)
+    inputs = timeline.inputs_over(manifest, numbers.values, time, time)
     given = {"t": np.zeros(len(time)), "x": states, "u": inputs, "p": numbers.p, "c": numbers.c}
     signals = channels.outputs_at(len(time), given)
-    crank = np.array(
-        [driver_angle.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)]
-    )
+    crank = np.array([timeline.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)])
     found = {}
     for bearing in manifest.bearings:
         force, x, y, outer, inner = (signals[bearing.prefix + name] for name in names)
@@ -139,7 +138,7 @@ class WearField:
     def deepest(self) -> tuple[float, float, float]:
         """Largest rate [N/(m s)], its angle in the ring's own coordinates [rad], its place across the groove [m]."""
         sector, k = np.unravel_index(int(np.argmax(self.rate)), self.rate.shape)
-        return float(self.rate[sector, k]), driver_angle.TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
+        return float(self.rate[sector, k]), TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
 
 
 def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> WearField:
@@ -157,7 +156,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
     across = np.linspace(0.0, widest, ACROSS)
     row, ball = np.nonzero(force > 0.0)
     load, passed = force[row, ball], moved[row]
-    place = (angle[row] / driver_angle.TURN + ball / balls) % 1.0
+    place = (angle[row] / TURN + ball / balls) % 1.0
     sector = np.minimum((SECTORS * place).astype(int), SECTORS - 1)
     half = contact.semi_axes(load)[0]
     rate = np.zeros((SECTORS, ACROSS))
@@ -165,13 +164,13 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
         within = half > x
         worn = passed[within] * depth_of_pass(x, load[within], contact)
         rate[:, k] = np.bincount(sector[within], worn, SECTORS)
-    return WearField(across=across, rate=rate * SECTORS / (driver_angle.TURN * length))
+    return WearField(across=across, rate=rate * SECTORS / (TURN * length))
 
 
 def _moved(angle: Array) -> Array:
     """How far an angle moves behind each sample, by less than half a turn; behind the last as behind the one before."""
     moved = np.diff(angle, append=angle[-1:])
-    moved = (moved + np.pi) % driver_angle.TURN - np.pi  # angles come back after a turn
+    moved = (moved + np.pi) % TURN - np.pi  # angles come back after a turn
     if len(moved) > 1:
         moved[-1] = moved[-2]
     return np.asarray(moved)

@@ -14,7 +14,6 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import STIFF_RATIO, differentiating_method
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
@@ -24,6 +23,7 @@ from ballpass.runtime.run.resolve import SCALED_TURNS, Run, resolve
 from ballpass.runtime.run.segments import check_count
 from ballpass.runtime.run.sensitivity import loosened
 from ballpass.runtime.run.start import start_state
+from ballpass.runtime.time import timeline
 
 #: Growth of a change of the start below which a motion is not chaotic: one of 1e-10 (`growth.TINY`) then changes the
 #: motion by 1e-6, far from what four digits bear.  Shipped scenes have 300 at most, chaotic ones 1e9 [1].
@@ -41,13 +41,13 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
     asked = differentiating_method("sensitivity", request.method or "auto")
     fine = "stepper-dop853"
     if model.states:
-        turn = driver_angle.period(model.manifest, numbers.values)
+        turn = timeline.period(model.manifest, numbers.values)
         looked_at = min(run_length(model, request, turn), SCALED_TURNS * turn)
         scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
     method = fine if asked == "auto" else asked
     run = resolve(model, numbers, replace(request, method=method, kinks=None))
-    check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before any long computation
+    check_count(model.manifest, numbers, run.duration, run.turn)  # before any long computation
     return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
 
 

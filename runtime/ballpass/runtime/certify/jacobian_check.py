@@ -34,7 +34,7 @@ from ballpass.runtime.point.jacobian import (
 )
 from ballpass.runtime.point.linearize import onset_notes
 from ballpass.runtime.point.slopes import slopes
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
 
 #: A factor of a unit such as "N*s/m^1.5": the mark before it, its name, its power.
 _FACTOR = re.compile(r"([*/]?)([A-Za-z]+)(?:\^([0-9.]+))?")
@@ -208,8 +208,8 @@ def _motion(
     """Where a name stands, the largest step for it, and the rows as a function of its value."""
     there = point(model, numbers, t, x)
     if name in (TIME, CRANK_ANGLE):
-        rate = 1.0 if name == TIME else turning_speed(model, numbers)
-        speed = abs(driver_angle.shaft_speed(model.manifest, numbers.values))
+        rate = 1.0 if name == TIME else turning_speed(model, numbers, t)
+        speed = abs(float(timeline.driver(model.manifest, numbers.values).at(t)[1]))
         step = STEP / speed if speed else STEP_FROM_ZERO["s"]
         # with the inputs of this instant, as between breakpoints: a gate's jump has no derivative
         return 0.0, step * abs(rate), lambda v: values_of_rows(model, parts, {**there, "t": v / rate})

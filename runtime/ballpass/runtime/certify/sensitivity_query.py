@@ -46,11 +46,12 @@ from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import Request, asked_length, tolerance
 from ballpass.runtime.run.resolve import Run, asked_transient
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
 
@@ -279,7 +280,7 @@ def _difference_scales(run: Run, names: Sequence[str]) -> Array:
         if name in at_start:
             value = max(value, START_SHARE * at_start[name])
         elif units[name] == ANGLE:
-            value = min(1.0, driver_angle.TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
+            value = min(1.0, TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
         elif value == 0.0:
             alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
             value = position if units[name] == "m" else max(alike, default=0.0)
@@ -291,7 +292,7 @@ def _jittered(run: Run) -> list[dict[str, float]]:
     """Tiny changes of speed and start, whatever is differentiated: they move every step."""
     manifest, parameters = run.model.manifest, run.numbers.parameters
     scales = dict(zip(manifest.initial, run.magnitude.tolist(), strict=False))
-    speed = driver_angle.speed_name(manifest)
+    speed = timeline.speed_name(manifest)
     if speed is not None and speed in parameters:
         scales[speed] = abs(parameters[speed])
     moves = JITTER * np.arange(-(JITTERED // 2), JITTERED // 2 + 1)
@@ -309,10 +310,8 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities) 
     signals = ChannelValues(model, [*names, *([state] if state else [])]).along(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
-    if state:
-        angles = signals[state].value[order, 0] % driver_angle.TURN
-    else:
-        angles = driver_angle.crank_angles(manifest, numbers.values, times)
+    known = timeline.crank_angles(manifest, numbers.values, times)
+    angles = signals[state].value[order, 0] % TURN if state else known
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

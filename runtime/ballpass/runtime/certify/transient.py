@@ -16,10 +16,10 @@ from ballpass.runtime.certify.growth import Growth, by_moved_start
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.manifest import RunInfo
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.settle import repeats
+from ballpass.runtime.time import timeline
 
 #: How far the rings are moved at the start, in their magnitudes [1]: what a start at rest is off by.
 MOVED = 0.1
@@ -41,7 +41,7 @@ def find_transient(model: LoadedModel) -> RunInfo:
     numbers = model.numbers()
     if given.cycles is None or not (model.has_stepper and model.states):
         return given
-    turn = driver_angle.period(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
     if not repeats(model, numbers.values, given.transient_cycles * turn):
         return given
     transient, length, left = given.transient_cycles, given.cycles - given.transient_cycles, SEARCH

@@ -12,16 +12,16 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
 from ballpass.runtime.show.short import ShortRepr
 
-SCHEMA = 6
+SCHEMA = 7
 FILE_NAME = "manifest.json"
 
-#: Last key of the file: sha256 of its text without this key.
 #: Name of the input that holds the slope of a driver's table of speed over time.
 DRIVER_ACCELERATION = "driver.acceleration"
 
-#: Inputs of a cage whose slip changes over time: where its lag follows from time alone, and where it is a state.
-CAGE_LAG_RATE, CAGE_EXCESS_SLIP = "cage.lag_rate", "cage.excess_slip"
+#: Input of a cage whose slip changes over time: what its slip is beyond that of the last row.
+CAGE_EXCESS_SLIP = "cage.excess_slip"
 
+#: Last key of the file: sha256 of its text without this key.
 DIGEST = "digest"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
@@ -108,25 +108,54 @@ class QuantityInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TurningInfo:
+    """An angle that is known before a run: names of parameters and derived constants.
+
+    It is ``offset`` at t = 0 [rad] and grows at ``rate`` [rad/s]; where that changes over time, ``rate`` is the first.
+    It then makes ``turns`` turns in one of the driver, whose speeds are `speeds` in rows at `times`, linear between
+    them (one speed without rows: constant).  A cage whose slip changes lags by `lag` [rad], and, from the first row at
+    `lag_times` on, by ``rolling`` times the driver's speed times the slope of `lags` [s]; it has the slip of the last
+    row outside of these.
+
+    `kind` says what turns: the driver (or shaft), a cage, the balls over a ring or about their axes, or a load; `words`
+    names it for people.  A turn falls into `parts` that look alike: the balls of a cage.
+    """
+
+    name: str
+    kind: Literal["driver", "cage", "pass", "spin", "load"]
+    words: str
+    offset: str
+    rate: str
+    parts: int = 1
+    turns: str = ""
+    times: tuple[str, ...] = ()
+    speeds: tuple[str, ...] = ()
+    rolling: str = ""
+    lag: str = ""
+    lag_times: tuple[str, ...] = ()
+    lags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InputInfo:
     """A quantity the driver holds constant between breakpoints.
 
-    kind ``phase``: the angle ``offset + rate * t_ref`` [rad] at the reference time; `offset` names a parameter, `rate`
-    a parameter or derived constant [rad/s].
-    kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names),
-    else 0.  Where it has `times`, the piecewise linear table of `times` and `values` is added to that angle.
+    kind ``phase``: the angle of `turning` at the reference time, within a turn [rad], ``angle``: the same with whole
+    turns, ``rate``: its rate there [rad/s], ``slope``: the slope of that [rad/s^2].
+    kind ``gate``: 1 while that angle, modulo a turn over `parts`, lies in one of `windows` (pairs of names), else 0.
     kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
-    (names of parameters); kind ``table_rate``: its slope there.  Where `rate` is named, `times` are values of the angle
-    ``offset + rate * t`` [rad], the table is periodic over a turn, and its slope is that over the angle.
+    (names of parameters); kind ``table_rate``: its slope there.  With a `turning`, `times` are values of its angle
+    [rad], the table is periodic over `turns` turns, and its slope is that over the angle.
     kind ``border``: 0.  A window of a driver's angle that is a state is open where its switching function is above it;
     the stepper holds the sides of `windows`, of which there is one, by an infinite border.  So with stops, which have
     no windows.
     """
 
     name: str
-    kind: Literal["phase", "gate", "table", "table_rate", "border"]
-    offset: str = ""
-    rate: str = ""
+    kind: Literal["phase", "angle", "rate", "slope", "gate", "table", "table_rate", "border"]
+    turning: str = ""
+    turns: int = 1
+    parts: int = 1
     windows: tuple[tuple[str, str], ...] = ()
     times: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
@@ -260,8 +289,7 @@ class BearingInfo:
     ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
     `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
-    whether the inner ring makes no whole turns; `inner_turns` names the constant with the number of its whole turns in
-    a turn of the driver, where that decides; `beside` names the first of several two-way bearings of a joint, whose
+    whether the inner ring makes no whole turns; `beside` names the first of several two-way bearings of a joint, whose
     inner rings move alike.
     """
 
@@ -278,7 +306,6 @@ class BearingInfo:
     lubrication: LubricationInfo | None = None
     element: str = "ball"
     inner_stands: bool = False
-    inner_turns: str = ""
     beside: str = ""
     alignment: AlignmentInfo | None = None
 
@@ -295,9 +322,9 @@ class MechanismInfo:
     ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
     the parameter ``mechanism.forces.<name>.direction`` the direction.
 
-    Where the speed changes, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
+    Where a torque drives, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
     `start_angle` the parameters they start from; else they are empty.  No input holds the gate or the table of a force
-    then: it follows from the angle.
+    then: it follows from the angle.  `turns` lists tables over several turns of it, as ``force.gas``, and how many.
     """
 
     speed: str
@@ -309,6 +336,7 @@ class MechanismInfo:
     angle: str = ""
     rate: str = ""
     driver: str = ""  # the joint that is turned
+    turns: tuple[tuple[str, int], ...] = ()
     springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 
 
@@ -335,6 +363,7 @@ class Manifest(ShortRepr):
     states: tuple[VariableInfo, ...]
     coordinates: tuple[CoordinateInfo, ...]
     initial: tuple[str, ...]  # names of the parameters that hold the initial states
+    turnings: tuple[TurningInfo, ...]
     inputs: tuple[InputInfo, ...]
     outputs: tuple[VariableInfo, ...]
     functions: tuple[FunctionInfo, ...]

@@ -412,4 +412,5 @@ void ballpass_ensemble_sizes(int *sizes)
     sizes[3] = (int)sizeof(ballpass_ensemble_options);
     sizes[4] = (int)sizeof(ballpass_schedule);
     sizes[5] = (int)sizeof(schedule_input);
+    sizes[6] = (int)sizeof(schedule_turning);
 }

@@ -53,10 +53,10 @@ BALLPASS_EXPORT void ballpass_ensemble_magnitudes(long members, const double *p,
 
 BALLPASS_EXPORT long ballpass_ensemble_work(long members);
 
-/* What the segments of members are made of: the model's inputs, and the numbers these name, [members][columns]. */
+/* What the segments of members are made of: the model's inputs and turnings, and the numbers these name, [members][columns]. */
 typedef struct {
-    const schedule_input *inputs;
-    int count, columns;
+    schedule_scene scene;
+    int columns;
     long members;
     const double *values;
 } ballpass_schedule;
@@ -81,7 +81,7 @@ BALLPASS_EXPORT void ballpass_schedule_inputs(const ballpass_schedule *schedule,
 BALLPASS_EXPORT long ballpass_schedule_moments(const ballpass_schedule *schedule, const long *first, const double *times,
                                                const double *horizons, long *rows, double *u);
 
-/* Numbers in a reduction, its channels, the lanes of this library; bytes of the options, of a schedule and of an input in it. */
+/* Numbers in a reduction, its channels, the lanes of this library; bytes of the options, of a schedule, of an input and a turning in it. */
 BALLPASS_EXPORT void ballpass_ensemble_sizes(int *sizes);
 
 #endif

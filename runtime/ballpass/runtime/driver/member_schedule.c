@@ -18,7 +18,6 @@ static double window_begin(double w, double turns_a_window, double duration, dou
 double ballpass_schedule_edges(const ballpass_schedule *schedule, const double *durations, const double *turns, const double *starts,
                                double turns_a_window, long window, long windows, double room, long *first, double *times)
 {
-    const schedule_input *inputs = schedule->inputs;
     double most = 0.0;
     long segments = 0;
     if (room > 0.0) first[0] = 0;
@@ -33,11 +32,11 @@ double ballpass_schedule_edges(const ballpass_schedule *schedule, const double *
             if (!(left < right)) break;
             /* reductions start on an edge; not a window of its own, whose first step size would be estimated anew */
             const int split = left + near < start && start < right - near;
-            most += 1.0 + schedule_most_segments(inputs, schedule->count, values, right - left, turn);
+            most += 1.0 + schedule_most_segments(&schedule->scene, values, right - left, turn);
             for (int part = 0; part <= split && room > 0.0; part++) {
                 const double begin = part ? start : left, end = split && !part ? start : right;
                 double *edges;
-                const long count = schedule_edges(inputs, schedule->count, values, begin, end, turn, &edges);
+                const long count = schedule_edges(&schedule->scene, values, begin, end, turn, &edges);
                 if (count < 0) return -1.0;
                 for (long k = 0; k <= count; k++)
                     times[segments + m + k] = !split && fabs(edges[k] - start) <= near ? start : edges[k];
@@ -54,17 +53,17 @@ void ballpass_schedule_inputs(const ballpass_schedule *schedule, long count, con
                               double *u)
 {
     for (long i = 0; i < count; i++)
-        schedule_inputs(schedule->inputs, schedule->count, schedule->values + owner[i] * schedule->columns, t[i], inside[i],
-                        u + i * schedule->count);
+        schedule_inputs(&schedule->scene, schedule->values + owner[i] * schedule->columns, t[i], inside[i],
+                        u + i * schedule->scene.count);
 }
 
 long ballpass_schedule_moments(const ballpass_schedule *schedule, const long *first, const double *times, const double *horizons,
                                long *rows, double *u)
 {
-    const int columns = schedule->count > 0 ? schedule->count : 1;
+    const int columns = schedule->scene.count > 0 ? schedule->scene.count : 1;
     rows[0] = 0;
     for (long m = 0; m < schedule->members; m++)
-        rows[m + 1] = rows[m] + schedule_moments(schedule->inputs, schedule->count, schedule->values + m * schedule->columns,
+        rows[m + 1] = rows[m] + schedule_moments(&schedule->scene, schedule->values + m * schedule->columns,
                                                  times + first[m] + m, first[m + 1] - first[m], horizons[m], u + rows[m] * columns);
     return rows[schedule->members];
 }

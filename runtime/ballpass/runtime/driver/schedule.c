@@ -63,27 +63,156 @@ static void window(double first, double last, double *start, double *width)
     *width = wide;
 }
 
-/* Piece k of the time in which the angle of a gate grows evenly: its value at t = 0, its rate, begin and end. */
-static void piece_of_gate(const schedule_input *gate, const double *values, int k, double *offset, double *rate, double *begin, double *end)
+/* A number and its derivative along a direction. */
+typedef struct {
+    double v, d;
+} dual;
+
+static dual number(const double *values, const double *moved, int place)
 {
-    *offset = values[gate->offset];
-    *rate = values[gate->rate];
-    if (!gate->knots) return;
-    const int left = k > 0 ? k - 1 : 0, inside = k > 0 && k < gate->knots;
-    const double height = values[gate->heights[left]], knot = values[gate->times[left]];
-    const double slope = inside ? (values[gate->heights[k]] - height) / (values[gate->times[k]] - knot) : 0.0;
-    *offset += height - slope * knot;
-    *rate += slope;
-    if (k > 0 && knot > *begin) *begin = knot;
-    if (k < gate->knots && values[gate->times[k]] < *end) *end = values[gate->times[k]];
+    return place < 0 ? (dual){0.0, 0.0} : (dual){values[place], moved ? moved[place] : 0.0};
 }
 
-/* Times in [begin, end] at which offset + rate t passes `edge` modulo a turn. */
-static void add_passages(time_list *list, double edge, double offset, double rate, double begin, double end)
+static dual plus(dual a, dual b) { return (dual){a.v + b.v, a.d + b.d}; }
+static dual minus(dual a, dual b) { return (dual){a.v - b.v, a.d - b.d}; }
+static dual times(dual a, dual b) { return (dual){a.v * b.v, a.v * b.d + a.d * b.v}; }
+static dual over(dual a, dual b)
 {
-    const double a = (offset + rate * begin - edge) / TURN, b = (offset + rate * end - edge) / TURN;
+    const double q = a.v / b.v;
+    return (dual){q, (a.d - q * b.d) / b.v};
+}
+
+/* A piece of a turning: angle + rate s + half s^2 with s = t - begin, up to its end; `passed` since the first piece. */
+typedef struct {
+    dual begin, passed, angle, rate, half;
+    double end;
+} piece;
+
+/* The piece of a table behind a time: its row, and the slope there, zero outside of the rows. */
+static int row_behind(int rows, const int *at, const int *heights, const double *values, const double *moved, double begin, dual *slope)
+{
+    int k = 0;
+    *slope = (dual){0.0, 0.0};
+    while (k < rows && values[at[k]] <= begin) k++;
+    if (k > 0 && k < rows)
+        *slope = over(minus(number(values, moved, heights[k]), number(values, moved, heights[k - 1])),
+                      minus(number(values, moved, at[k]), number(values, moved, at[k - 1])));
+    return k > 0 ? k - 1 : 0;
+}
+
+/* The next row behind a time, in place of `next` where it is nearer. */
+static void next_row(int rows, const int *at, const double *values, double begin, int *next)
+{
+    for (int k = 0; k < rows; k++)
+        if (values[at[k]] > begin && (*next < 0 || values[at[k]] < values[*next])) *next = at[k];
+}
+
+/* The first piece, or the one behind a piece; 0 where that was the last. */
+static int next_piece(const schedule_turning *turning, const double *values, const double *moved, int first, piece *p)
+{
+    const int live = turning->live >= 0 && isfinite(values[turning->live]);
+    const dual offset = minus(number(values, moved, turning->offset), live ? (dual){0.0, 0.0} : number(values, moved, turning->lag));
+    if (!first && isinf(p->end)) return 0;
+    if (turning->turns < 0 && !turning->rows && !live) {
+        *p = (piece){.angle = offset, .rate = number(values, moved, turning->rate), .end = INFINITY};
+        return 1;
+    }
+    int next = -1;
+    const double origin = live ? values[turning->live] : 0.0, from = first ? origin : p->end;
+    if (!live) next_row(turning->rows, turning->times, values, from, &next);
+    next_row(turning->lag_rows, turning->lag_times, values, from, &next);
+    if (first) {
+        p->begin = (dual){origin, 0.0};
+        p->passed = (dual){0.0, 0.0};
+    } else {
+        int here = -1; /* the row that the last piece ended on */
+        for (int k = 0; k < turning->rows && !live && here < 0; k++)
+            if (values[turning->times[k]] == p->end) here = turning->times[k];
+        for (int k = 0; k < turning->lag_rows && here < 0; k++)
+            if (values[turning->lag_times[k]] == p->end) here = turning->lag_times[k];
+        const dual end = number(values, moved, here), length = minus(end, p->begin);
+        p->passed = plus(p->passed, times(length, plus(p->rate, times(length, p->half))));
+        p->begin = end;
+    }
+    dual slope, slower, speed = {0.0, 0.0};
+    if (live) {
+        slope = (dual){values[turning->live + 2], 0.0};
+        speed = (dual){values[turning->live + 1] + slope.v * (p->begin.v - origin), 0.0};
+    } else {
+        const int row = row_behind(turning->rows, turning->times, turning->speeds, values, moved, p->begin.v, &slope);
+        if (turning->speeds) speed = number(values, moved, turning->speeds[row]);
+        if (turning->rows) speed = plus(speed, times(slope, minus(p->begin, number(values, moved, turning->times[row]))));
+    }
+    row_behind(turning->lag_rows, turning->lag_times, turning->lags, values, moved, p->begin.v, &slower);
+    const dual all = turning->turns < 0 ? (dual){1.0, 0.0} : number(values, moved, turning->turns);
+    const dual turned = minus(all, times(number(values, moved, turning->rolling), slower));
+    p->angle = plus(offset, p->passed);
+    p->rate = times(turned, speed);
+    p->half = times(times((dual){0.5, 0.0}, turned), slope);
+    p->end = next < 0 ? INFINITY : values[next];
+    return 1;
+}
+
+/* The piece that holds at a time. */
+static piece piece_at(const schedule_turning *turning, const double *values, const double *moved, double inside)
+{
+    piece p = {.end = 0.0};
+    for (int more = next_piece(turning, values, moved, 1, &p); more && p.end <= inside;) more = next_piece(turning, values, moved, 0, &p);
+    return p;
+}
+
+static dual angle_of(const piece *p, double t)
+{
+    const dual s = minus((dual){t, 0.0}, p->begin);
+    return plus(p->angle, times(s, plus(p->rate, times(s, p->half))));
+}
+
+static dual rate_of(const piece *p, double t)
+{
+    return plus(p->rate, times(times((dual){2.0, 0.0}, minus((dual){t, 0.0}, p->begin)), p->half));
+}
+
+void schedule_angle(const schedule_turning *turning, const double *values, double t, double *angle, double *rate)
+{
+    const piece p = piece_at(turning, values, NULL, t);
+    if (angle) *angle = angle_of(&p, t).v;
+    if (rate) *rate = rate_of(&p, t).v;
+}
+
+/* Times in a part of a piece, in which it grows or falls, at which `parts` times the angle passes an edge modulo a period. */
+static void add_within(time_list *list, const piece *p, double parts, double edge, double period, double left, double right)
+{
+    const double begin = p->begin.v, angle = parts * p->angle.v, rate = parts * p->rate.v, half = parts * p->half.v;
+    if (rate == 0.0 && half == 0.0) return;
+    const double s = left - begin, u = right - begin;
+    const double a = (angle + s * (rate + s * half) - edge) / period, b = (angle + u * (rate + u * half) - edge) / period;
     const double first = ceil((a < b ? a : b) - 1e-9), last = floor((a < b ? b : a) + 1e-9);
-    for (double turn = first; turn <= last && !list->short_of_memory; turn += 1.0) add(list, (edge - offset + TURN * turn) / rate);
+    const double sense = copysign(1.0, rate + 2.0 * half * (0.5 * (left + right) - begin));
+    for (double whole = first; whole <= last && !list->short_of_memory; whole += 1.0) {
+        const double ahead = (edge - angle) + period * whole;
+        double time = begin + ahead / rate;
+        if (half != 0.0) {
+            const double square = rate * rate + 4.0 * half * ahead, slower = rate + sense * sqrt(square > 0.0 ? square : 0.0);
+            time = slower == 0.0 ? begin - 0.5 * rate / half : begin + 2.0 * ahead / slower;
+        }
+        add(list, time < left ? left : time > right ? right : time);
+    }
+}
+
+/* Times in [begin, end] at which it does so. */
+static void add_passages(time_list *list, const schedule_turning *turning, const double *values, double parts, double edge, double period,
+                         double begin, double end)
+{
+    piece p = {.end = 0.0};
+    double from = begin;
+    for (int more = next_piece(turning, values, NULL, 1, &p); more && from < end; more = next_piece(turning, values, NULL, 0, &p)) {
+        const double to = p.end < end ? p.end : end, back = p.begin.v - 0.5 * p.rate.v / p.half.v;
+        if (to <= from) continue;
+        const int split = p.half.v != 0.0 && from < back && back < to && back > p.begin.v;
+        add_within(list, &p, parts, edge, period, from, split ? back : to);
+        if (split) add_within(list, &p, parts, edge, period, back, to);
+        from = to;
+    }
 }
 
 static int covers(double angle, double start, double width)
@@ -102,124 +231,112 @@ static int knots_before(const schedule_input *input, const double *values, doubl
     return before;
 }
 
-/* Piece of a table that holds at a time: places of its knots and heights, twice one where it is flat; where the piece begins and ends; the
-   argument that belongs to t. */
-typedef struct {
-    int left, right, low, high;
-    double begin, end, at;
-} table_piece;
-
-/* A table over an angle is periodic: its last knot joins the first. */
-static table_piece piece_of_table(const schedule_input *input, const double *values, double t, double inside)
+/* Value at t of the piece of a table that holds at `inside`, or its slope, with its derivative.  A table over an angle is periodic: its last
+   knot joins the first. */
+static dual table(const schedule_scene *scene, const schedule_input *input, const double *values, const double *moved, double t, double inside)
 {
-    const int over_angle = input->rate >= 0;
-    double argument = inside, at = t;
+    const int over_angle = input->turning >= 0, slope_only = input->kind == SCHEDULE_TABLE_RATE;
+    double argument = inside;
+    dual at = {t, 0.0};
+    const double period = input->turns * TURN;
     if (over_angle) {
-        const double first = values[input->times[0]], rate = values[input->rate];
-        double past = modulo(values[input->offset] + rate * inside - first, TURN);
-        if (TURN - past < ANGLE_RESOLUTION) past = 0.0;
+        const piece p = piece_at(&scene->turnings[input->turning], values, moved, inside);
+        const double first = values[input->times[0]], angle = angle_of(&p, inside).v;
+        double past = modulo(angle - first, period);
+        if (period - past < ANGLE_RESOLUTION) past = 0.0;
         argument = first + past;
-        at = argument + rate * (t - inside);
+        at = angle_of(&p, t);
+        at.v = argument + (at.v - angle);
     }
     const int k = knots_before(input, values, argument), last = k == input->knots;
-    int left = k - 1, right = last ? 0 : k;
-    if (!over_angle && (k == 0 || last)) left = right = k == 0 ? 0 : k - 1;
-    const double end = values[input->times[right]];
-    return (table_piece){input->times[left], input->times[right], input->heights[left], input->heights[right], values[input->times[left]],
-                         last && over_angle ? end + TURN : end, at};
+    const int left = k > 0 ? k - 1 : 0, right = last ? 0 : k;
+    const dual low = number(values, moved, input->heights[left]);
+    if (!over_angle && (k == 0 || last)) return slope_only ? (dual){0.0, 0.0} : low;
+    const dual begin = number(values, moved, input->times[left]);
+    dual end = number(values, moved, input->times[right]);
+    if (last) end.v += period;
+    const dual slope = over(minus(number(values, moved, input->heights[right]), low), minus(end, begin));
+    return slope_only ? slope : plus(low, times(slope, minus(at, begin)));
 }
 
-/* Value at t, or slope, of the piece that holds at `inside`. */
-static double table(const schedule_input *input, const double *values, double t, double inside)
+/* An input for a segment that starts at t, with its derivative; gates have none. */
+static dual input_at(const schedule_scene *scene, const schedule_input *input, const double *values, const double *moved, double t, double inside)
 {
-    const table_piece piece = piece_of_table(input, values, t, inside);
-    const int slope_only = input->kind == SCHEDULE_TABLE_RATE;
-    if (piece.low == piece.high) return slope_only ? 0.0 : values[piece.low];
-    const double slope = (values[piece.high] - values[piece.low]) / (piece.end - piece.begin);
-    return slope_only ? slope : values[piece.low] + slope * (piece.at - piece.begin);
-}
-
-/* Its derivative along a direction of the values. */
-static double table_tangent(const schedule_input *input, const double *values, const double *moved, double t, double inside)
-{
-    const table_piece piece = piece_of_table(input, values, t, inside);
-    const int slope_only = input->kind == SCHEDULE_TABLE_RATE;
-    if (piece.low == piece.high) return slope_only ? 0.0 : moved[piece.low];
-    const double length = piece.end - piece.begin, slope = (values[piece.high] - values[piece.low]) / length;
-    const double slope_moved = (moved[piece.high] - moved[piece.low] - slope * (moved[piece.right] - moved[piece.left])) / length;
-    const double at_moved = input->rate >= 0 ? moved[input->offset] + moved[input->rate] * t : 0.0;
-    return slope_only ? slope_moved : moved[piece.low] + slope_moved * (piece.at - piece.begin) + slope * (at_moved - moved[piece.left]);
-}
-
-void schedule_tangents(const schedule_input *inputs, int count, const double *values, const double *moved, double t, double inside, double *ud)
-{
-    for (int i = 0; i < count; i++) {
-        const schedule_input *input = &inputs[i];
-        ud[i] = 0.0;
-        if (input->kind == SCHEDULE_PHASE) ud[i] = moved[input->offset] + moved[input->rate] * t;
-        else if (input->kind == SCHEDULE_TABLE || input->kind == SCHEDULE_TABLE_RATE) ud[i] = table_tangent(input, values, moved, t, inside);
+    if (input->kind == SCHEDULE_BORDER) return (dual){0.0, 0.0};
+    if (input->kind == SCHEDULE_TABLE || input->kind == SCHEDULE_TABLE_RATE) return table(scene, input, values, moved, t, inside);
+    const piece p = piece_at(&scene->turnings[input->turning], values, moved, inside);
+    if (input->kind == SCHEDULE_RATE) return rate_of(&p, t);
+    if (input->kind == SCHEDULE_SLOPE) return times((dual){2.0, 0.0}, p.half);
+    if (input->kind == SCHEDULE_ANGLE) return angle_of(&p, t);
+    if (input->kind == SCHEDULE_PHASE) {
+        const dual angle = angle_of(&p, t);
+        return (dual){modulo(angle.v, TURN), angle.d};
     }
+    const piece many = {p.begin, p.passed, times((dual){input->parts, 0.0}, p.angle), times((dual){input->parts, 0.0}, p.rate),
+                        times((dual){input->parts, 0.0}, p.half), p.end};
+    for (int k = 0; k < input->windows; k++) {
+        double start, width;
+        window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
+        if (covers(angle_of(&many, inside).v, start, width)) return (dual){1.0, 0.0};
+    }
+    return (dual){0.0, 0.0};
 }
 
-void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u)
+void schedule_tangents(const schedule_scene *scene, const double *values, const double *moved, double t, double inside, double *ud)
 {
-    for (int i = 0; i < count; i++) {
-        const schedule_input *input = &inputs[i];
-        if (input->kind == SCHEDULE_PHASE) {
-            u[i] = modulo(values[input->offset] + values[input->rate] * t, TURN);
-        } else if (input->kind == SCHEDULE_GATE) {
-            const int piece = input->knots ? knots_before(input, values, inside) : 0;
-            double offset, rate, begin = inside, end = inside;
-            piece_of_gate(input, values, piece, &offset, &rate, &begin, &end);
-            const double angle = offset + rate * inside;
-            u[i] = 0.0;
-            for (int k = 0; k < input->windows; k++) {
-                double start, width;
-                window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
-                if (covers(angle, start, width)) u[i] = 1.0;
-            }
-        } else if (input->kind == SCHEDULE_BORDER) {
-            u[i] = 0.0;
-        } else {
-            u[i] = table(input, values, t, inside);
-        }
-    }
+    for (int i = 0; i < scene->count; i++) ud[i] = input_at(scene, &scene->inputs[i], values, moved, t, inside).d;
 }
 
-int schedule_fault(const schedule_input *inputs, int count, const double *values)
+void schedule_inputs(const schedule_scene *scene, const double *values, double t, double inside, double *u)
 {
-    for (int i = 0; i < count; i++) {
-        const int *times = inputs[i].times, knots = inputs[i].knots;
-        for (int k = 1; k < knots; k++)
-            if (!(values[times[k]] > values[times[k - 1]])) return i;
-        if (knots && inputs[i].rate >= 0 && inputs[i].kind != SCHEDULE_GATE && !(values[times[knots - 1]] - values[times[0]] < TURN - ANGLE_RESOLUTION)) return i;
+    for (int i = 0; i < scene->count; i++) u[i] = input_at(scene, &scene->inputs[i], values, NULL, t, inside).v;
+}
+
+static int increases(int rows, const int *at, const double *values)
+{
+    for (int k = 1; k < rows; k++)
+        if (!(values[at[k]] > values[at[k - 1]])) return 0;
+    return 1;
+}
+
+int schedule_fault(const schedule_scene *scene, const double *values)
+{
+    for (int i = 0; i < scene->count; i++) {
+        const schedule_input *input = &scene->inputs[i];
+        const int *at = input->times, knots = input->knots;
+        if (!increases(knots, at, values)) return 1;
+        if (knots && input->turning >= 0 && !(values[at[knots - 1]] - values[at[0]] < input->turns * TURN - ANGLE_RESOLUTION)) return 1;
     }
-    return -1;
+    for (int i = 0; i < scene->turning_count; i++) {
+        const schedule_turning *turning = &scene->turnings[i];
+        if (!increases(turning->rows, turning->times, values) || !increases(turning->lag_rows, turning->lag_times, values)) return 1;
+    }
+    return 0;
 }
 
 /* Times at which something switches, sorted, those that are one time once. */
-static void add_breakpoints(time_list *list, const schedule_input *inputs, int count, const double *values, double begin, double end)
+static void add_breakpoints(time_list *list, const schedule_scene *scene, const double *values, double begin, double end)
 {
     time_list found = {NULL, 0, 0, 0};
-    for (int i = 0; i < count; i++) {
-        const schedule_input *input = &inputs[i];
-        for (int piece = 0; input->kind == SCHEDULE_GATE && piece <= input->knots; piece++) {
-            double offset, rate, from = begin, to = end;
-            piece_of_gate(input, values, piece, &offset, &rate, &from, &to);
-            if (rate == 0.0 || from >= to) continue;
-            for (int k = 0; k < input->windows; k++) {
-                double start, width;
-                window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
-                if (width <= 0.0 || width >= TURN) continue;
-                add_passages(&found, start, offset, rate, from, to);
-                add_passages(&found, start + width, offset, rate, from, to);
-            }
+    for (int i = 0; i < scene->turning_count; i++) {
+        const schedule_turning *turning = &scene->turnings[i];
+        const int live = turning->live >= 0 && isfinite(values[turning->live]);
+        for (int k = 0; k < turning->rows && !live; k++) add(&found, values[turning->times[k]]);
+        for (int k = 0; k < turning->lag_rows; k++) add(&found, values[turning->lag_times[k]]);
+    }
+    for (int i = 0; i < scene->count; i++) {
+        const schedule_input *input = &scene->inputs[i];
+        const schedule_turning *turning = input->turning < 0 ? NULL : &scene->turnings[input->turning];
+        for (int k = 0; input->kind == SCHEDULE_GATE && k < input->windows; k++) {
+            double start, width;
+            window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
+            if (width <= 0.0 || width >= TURN) continue;
+            add_passages(&found, turning, values, input->parts, start, TURN, begin, end);
+            add_passages(&found, turning, values, input->parts, start + width, TURN, begin, end);
         }
-        if (input->kind == SCHEDULE_GATE) continue; /* its knots are those of a table */
         for (int k = 0; k < input->knots; k++) {
-            const double knot = values[input->times[k]];
-            if (input->rate < 0) add(&found, knot);
-            else if (values[input->rate] != 0.0) add_passages(&found, knot, values[input->offset], values[input->rate], begin, end);
+            if (turning) add_passages(&found, turning, values, 1.0, values[input->times[k]], input->turns * TURN, begin, end);
+            else add(&found, values[input->times[k]]);
         }
     }
     if (found.count) qsort(found.times, (size_t)found.count, sizeof *found.times, by_size);
@@ -249,12 +366,27 @@ static void add_turns(time_list *list, long breakpoints, double begin, double en
     }
 }
 
-/* Rate of the fastest phase [rad/s]. */
-static double fastest_phase(const schedule_input *inputs, int count, const double *values)
+/* Largest rate of a turning [rad/s]. */
+static double fastest_of(const schedule_turning *turning, const double *values)
 {
     double most = 0.0;
-    for (int i = 0; i < count; i++)
-        if (inputs[i].kind == SCHEDULE_PHASE && fabs(values[inputs[i].rate]) > most) most = fabs(values[inputs[i].rate]);
+    piece p = {.end = 0.0};
+    for (int more = next_piece(turning, values, NULL, 1, &p); more; more = next_piece(turning, values, NULL, 0, &p)) {
+        const double begin = fabs(p.rate.v), end = isfinite(p.end) ? fabs(rate_of(&p, p.end).v) : 0.0;
+        if (begin > most) most = begin;
+        if (end > most) most = end;
+    }
+    return most;
+}
+
+/* Rate of the fastest phase [rad/s]. */
+static double fastest_phase(const schedule_scene *scene, const double *values)
+{
+    double most = 0.0;
+    for (int i = 0; i < scene->turning_count; i++) {
+        const double fastest = fastest_of(&scene->turnings[i], values);
+        if (fastest > most) most = fastest;
+    }
     return most;
 }
 
@@ -276,20 +408,24 @@ static void cut_short(time_list *list, double fastest)
     *list = cut;
 }
 
-double schedule_most_segments(const schedule_input *inputs, int count, const double *values, double length, double turn)
+double schedule_most_segments(const schedule_scene *scene, const double *values, double length, double turn)
 {
-    double most = 1.0 + length / turn + length * fastest_phase(inputs, count, values) / LARGEST_PHASE;
-    for (int i = 0; i < count; i++) {
-        const double turns = inputs[i].rate >= 0 ? 1.0 + length * fabs(values[inputs[i].rate]) / TURN : 1.0;
-        most += ((inputs[i].kind == SCHEDULE_GATE ? 2.0 * inputs[i].windows : 0.0) + inputs[i].knots) * turns;
+    double most = 1.0 + length / turn + length * fastest_phase(scene, values) / LARGEST_PHASE;
+    for (int i = 0; i < scene->turning_count; i++) most += scene->turnings[i].rows + scene->turnings[i].lag_rows;
+    for (int i = 0; i < scene->count; i++) {
+        const schedule_input *input = &scene->inputs[i];
+        double passed = 1.0;
+        if (input->turning >= 0)
+            passed = (double)input->parts / input->turns * (1.0 + length * fastest_of(&scene->turnings[input->turning], values) / TURN);
+        most += (2.0 * input->windows + input->knots) * passed;
     }
     return most;
 }
 
-int schedule_moments(const schedule_input *inputs, int count, const double *values, const double *edges, long segments, double horizon,
+int schedule_moments(const schedule_scene *scene, const double *values, const double *edges, long segments, double horizon,
                      double *u)
 {
-    const int columns = count > 0 ? count : 1;
+    const int columns = scene->count > 0 ? scene->count : 1;
     const double apart = (double)(segments - 1) / (SCHEDULE_MOMENTS - 1);
     int rows = 0;
     long before = -1;
@@ -299,21 +435,21 @@ int schedule_moments(const schedule_input *inputs, int count, const double *valu
         before = i;
         const double middle = 0.5 * (edges[i] + edges[i + 1]);
         u[rows * columns] = 0.0;
-        schedule_inputs(inputs, count, values, middle, middle, u + rows++ * columns);
+        schedule_inputs(scene, values, middle, middle, u + rows++ * columns);
     }
     for (int k = 0; k < SCHEDULE_MOMENTS; k++) {
         const double moment = horizon * (k + 0.5) / SCHEDULE_MOMENTS;
         u[rows * columns] = 0.0;
-        schedule_inputs(inputs, count, values, moment, moment, u + rows++ * columns);
+        schedule_inputs(scene, values, moment, moment, u + rows++ * columns);
     }
     return rows;
 }
 
-long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges)
+long schedule_edges(const schedule_scene *scene, const double *values, double begin, double end, double turn, double **edges)
 {
     time_list list = {NULL, 0, 0, 0};
     add(&list, begin);
-    if (!list.short_of_memory) add_breakpoints(&list, inputs, count, values, begin, end);
+    if (!list.short_of_memory) add_breakpoints(&list, scene, values, begin, end);
     if (!list.short_of_memory && isfinite(turn)) add_turns(&list, list.count - 1, begin, end, turn);
     add(&list, end);
     if (list.short_of_memory) {
@@ -321,7 +457,7 @@ long schedule_edges(const schedule_input *inputs, int count, const double *value
         return -1;
     }
     qsort(list.times, (size_t)list.count, sizeof *list.times, by_size);
-    cut_short(&list, fastest_phase(inputs, count, values));
+    cut_short(&list, fastest_phase(scene, values));
     if (list.short_of_memory) {
         free(list.times);
         return -1;

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
-from ballpass.runtime.contract.manifest import InputInfo
 from ballpass.runtime.export.scene_numbers import computed_outputs, outputs_function
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.time import timeline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ def dependencies(model: LoadedModel) -> Dependencies:
     names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
     own = np.eye(len(manifest.parameters), dtype=bool)
     both = np.vstack([own, _pattern(model.symbolic("constants")(moment["p"]), moment["p"])])
-    inputs = _among(names, [_named(item) for item in manifest.inputs]) @ both
+    inputs = _among(names, [timeline.names_of_input(manifest, item) for item in manifest.inputs]) @ both
     start = _among(names, [(name,) for name in manifest.initial]) @ both
     p = p | u @ inputs | c @ both[len(own) :]
     unmoved, itself = np.zeros((len(start), 1), dtype=bool), np.eye(len(start), dtype=bool)
@@ -68,12 +68,6 @@ def _pattern(result: casadi.SX, symbol: casadi.SX) -> np.ndarray:
     """Whether each number of a result depends on each of a symbol, shape (numbers of the result, of the symbol)."""
     sparsity = casadi.Function("f", [symbol], [result], {"allow_free": True}).jac_sparsity(0, 0)
     return np.array(casadi.DM(sparsity, 1.0).full() != 0.0)
-
-
-def _named(item: InputInfo) -> tuple[str, ...]:
-    """Parameters and derived constants that an input depends on."""
-    edges = (edge for window in item.windows for edge in window)
-    return tuple(name for name in (item.offset, item.rate, *edges, *item.times, *item.values) if name)
 
 
 def _among(names: Sequence[str], chosen: Sequence[Iterable[str]]) -> np.ndarray:

@@ -42,7 +42,6 @@ from ballpass.runtime.export.scene_numbers import (
     MOMENT,
     behind,
     computed_outputs,
-    driven,
     filled,
     speed_table,
     varying,
@@ -50,8 +49,8 @@ from ballpass.runtime.export.scene_numbers import (
 from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.driver_angle import period
 from ballpass.runtime.run.magnitudes import model_scales
+from ballpass.runtime.time.timeline import period
 
 #: C of the interface, the standard's headers, and the licence of both.
 FMI = DRIVER / "fmi"
@@ -120,7 +119,7 @@ def input_names(manifest: Manifest, asked: Sequence[str]) -> tuple[str, ...]:
     RequestError
         An unknown name, or that of a number that cannot change in a run.
     """
-    able, chosen = (*varying(manifest), *([SPEED] if driven(manifest) else ())), set[str]()
+    able, chosen = (*varying(manifest), *([SPEED] if speed_table(manifest)[0] else ())), set[str]()
     for name in asked:
         found = [known for known in able if known == name or known.startswith(f"{name}.")]
         if found:
@@ -216,8 +215,6 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
     for info in computed_outputs(manifest):
         first += info.size
         ends.append(first)
-    # the state of a driver whose speed is given over time belongs to t = 0
-    given = driven(manifest) is not None
     speeds, times = speed_table(manifest) if SPEED in inputs else ((), ())
     names = [info.name for info in manifest.parameters]
     table = ", ".join(str(names.index(name)) for name in (*speeds, *times)) or "0"
@@ -225,7 +222,6 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
         FMI / "fmu.h.in",
         TOKEN=token,
         OUTPUTS=str(len(ends)),
-        ZERO=str(int(given)),
         DRIVEN=str(int(SPEED in inputs)),
         SPEEDS=str(len(speeds)),
         TABLE=str(len(speeds) + len(times)),

@@ -19,7 +19,7 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies
 from ballpass.runtime.export.scene_numbers import computed_outputs, speed_table, varying
-from ballpass.runtime.run.driver_angle import period
+from ballpass.runtime.time.timeline import period
 
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"

@@ -7,17 +7,18 @@ In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``sc
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, InputInfo, Manifest, MarginInfo, VariableInfo
+from ballpass.runtime.contract.manifest import Manifest, MarginInfo, TurningInfo, VariableInfo
 from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.driver_angle import speed_name
 from ballpass.runtime.run.locating import has_kinks, tight_below
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.timeline import speed_name
 
 #: C sources that are the same for every scene, and templates of those that are not.
 STANDALONE = DRIVER / "standalone"
@@ -35,6 +36,9 @@ _VARYING = re.compile(
 
 _KINDS = {
     "phase": "SCHEDULE_PHASE",
+    "angle": "SCHEDULE_ANGLE",
+    "rate": "SCHEDULE_RATE",
+    "slope": "SCHEDULE_SLOPE",
     "gate": "SCHEDULE_GATE",
     "table": "SCHEDULE_TABLE",
     "table_rate": "SCHEDULE_TABLE_RATE",
@@ -43,9 +47,9 @@ _KINDS = {
 
 
 def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
-    """Of the dyads of the linkage; none where there is no linkage, or its driver's angle is a state."""
+    """Of the dyads of the linkage; none where there is no linkage, or its driver's speed changes."""
     mechanism = manifest.mechanism
-    return () if mechanism is None or mechanism.angle else mechanism.margins
+    return () if mechanism is None or mechanism.angle or speed_table(manifest)[0] else mechanism.margins
 
 
 def columns_of(manifest: Manifest) -> tuple[tuple[str, str], ...]:
@@ -70,23 +74,15 @@ def varying(manifest: Manifest) -> tuple[str, ...]:
     Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.  Nor that of a
     shaft whose cage slips by a table: the lag of the cage is a multiple of it, so that its angle would jump.
     """
-    lags = any(item.name.endswith("cage.lag") for item in manifest.inputs)
+    lags = any(info.lag for info in manifest.turnings)
     names = (info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
     return tuple(name for name in names if not (lags and name == "shaft.speed"))
 
 
-def driven(manifest: Manifest) -> tuple[int, int] | None:
-    """Acceleration among the inputs, speed among the states, of a driver with a table of its speed; None without."""
-    names = [item.name for item in manifest.inputs]
-    if manifest.mechanism is None or DRIVER_ACCELERATION not in names:
-        return None
-    return names.index(DRIVER_ACCELERATION), [info.name for info in manifest.states].index(manifest.mechanism.rate)
-
-
 def speed_table(manifest: Manifest) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Parameters that are speeds and times of the table of a driver's speed; none without."""
-    found = driven(manifest)
-    return ((), ()) if found is None else (manifest.inputs[found[0]].values, manifest.inputs[found[0]].times)
+    info = timeline.driver_info(manifest)
+    return ((), ()) if info is None or not info.times else (info.speeds, info.times)
 
 
 def filled(template: Path, **values: str) -> str:
@@ -99,6 +95,7 @@ def scene_header(manifest: Manifest) -> str:
     sizes = {
         "SCENE_STATES": len(manifest.states),
         "SCENE_INPUTS": len(manifest.inputs),
+        "SCENE_TURNINGS": len(manifest.turnings),
         "SCENE_PARAMETERS": len(manifest.parameters),
         "SCENE_CONSTANTS": len(manifest.constants),
         "SCENE_RELATIONS": len(manifest.relations),
@@ -132,9 +129,10 @@ def scene_source(manifest: Manifest) -> str:
     ]
     relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
     columns = [f"    {{{_string(name)}, {_string(unit)}}}," for name, unit in columns_of(manifest)]
-    indices, inputs = _inputs(manifest.inputs, place)
-    acceleration, driver = driven(manifest) or (-1, -1)
-    offsets = [str(place[item.offset]) if item.offset else "-1" for item in manifest.inputs]
+    indices, inputs = _inputs(manifest, place)
+    more, turnings = _turnings(manifest.turnings, place)
+    drivers = [k for k, info in enumerate(manifest.turnings) if info.kind == "driver"]
+    offsets = [str(place[info.offset]) if info.offset else "-1" for info in manifest.turnings]
     return filled(
         STANDALONE / "scene.c.in",
         TITLE=_string(manifest.title),
@@ -145,10 +143,10 @@ def scene_source(manifest: Manifest) -> str:
         INITIAL=_listed(str(place[name]) for name in manifest.initial),
         SPEED="-1" if speed is None else str(place[speed]),
         LINKAGE="".join(f"{line}\n" for line in _linkage(manifest, place)),
-        PLACES="".join(f"{line}\n" for line in indices),
+        PLACES="".join(f"{line}\n" for line in (*indices, *more)),
         INPUTS=inputs,
-        ACCELERATION=str(acceleration),
-        DRIVER=str(driver),
+        TURNINGS=turnings,
+        DRIVER=str(drivers[0] if drivers else -1),
         OFFSETS=_listed(offsets) or "-1",  # C has no arrays of length zero
         CYCLES=repr(float(run.cycles or 0.0)),
         DURATION=repr(float(run.duration or 0.0)),
@@ -170,29 +168,47 @@ def _linkage(manifest: Manifest, place: dict[str, int]) -> list[str]:
     return [f"const int scene_start_angle = {start};", "const scene_margin scene_margin_infos[] = {", *rows, "};", ""]
 
 
-def _inputs(inputs: Sequence[InputInfo], place: dict[str, int]) -> tuple[list[str], str]:
+def _array(arrays: list[str], name: str, names: Sequence[str], place: Mapping[str, int]) -> str:
+    """An array of places is declared; its name."""
+    if not names:
+        return "NULL"
+    arrays.append(f"static const int {name}[] = {{{_listed(str(place[n]) for n in names)}}};")
+    return name
+
+
+def _inputs(manifest: Manifest, place: dict[str, int]) -> tuple[list[str], str]:
     """Arrays of places, and the entries of the table of inputs that name them."""
-    arrays: list[str] = []
-
-    def array(name: str, names: Sequence[str]) -> str:
-        if not names:
-            return "NULL"
-        arrays.append(f"static const int {name}[] = {{{_listed(str(place[n]) for n in names)}}};")
-        return name
-
-    entries = []
-    for k, item in enumerate(inputs):
-        edges = array(f"edges_{k}", [edge for window in item.windows for edge in window])
-        times = array(f"times_{k}", item.times)
-        heights = array(f"heights_{k}", item.values)
-        offset = len(place) + k if item.offset else -1  # an angle of its own, which starts from the parameter
-        rate = place[item.rate] if item.rate else -1
+    arrays, entries = list[str](), []
+    turnings = {info.name: k for k, info in enumerate(manifest.turnings)}
+    for k, item in enumerate(manifest.inputs):
+        edges = _array(arrays, f"edges_{k}", [edge for window in item.windows for edge in window], place)
+        times = _array(arrays, f"times_{k}", item.times, place)
+        heights = _array(arrays, f"heights_{k}", item.values, place)
         entries.append(
-            f"    {{{_KINDS[item.kind]}, {offset}, {rate}, {len(item.windows)}, {edges}, {len(item.times)}, {times}, "
-            f"{heights}}}, /* {item.name} */"
+            f"    {{{_KINDS[item.kind]}, {turnings.get(item.turning, -1)}, {item.turns}, {item.parts}, "
+            f"{len(item.windows)}, {edges}, {len(item.times)}, {times}, {heights}}}, /* {item.name} */"
         )
     # C has no arrays of length zero
-    return arrays, "\n".join(entries) or "    {SCHEDULE_PHASE, -1, -1, 0, NULL, 0, NULL, NULL}, /* none */"
+    return arrays, "\n".join(entries) or "    {SCHEDULE_BORDER, -1, 1, 1, 0, NULL, 0, NULL, NULL}, /* none */"
+
+
+def _turnings(infos: Sequence[TurningInfo], place: dict[str, int]) -> tuple[list[str], str]:
+    """The same of the table of turnings."""
+    arrays, entries, known = list[str](), [], {"": -1, **place}
+    live = len(place) + len(infos)
+    for k, info in enumerate(infos):
+        listed = [
+            _array(arrays, f"turning_{name}_{k}", getattr(info, name), place)
+            for name in ("times", "speeds", "lag_times", "lags")
+        ]
+        # an angle of its own, which starts from the parameter
+        numbers = [len(place) + k, *(known[name] for name in (info.rate, info.turns, info.rolling, info.lag))]
+        numbers += [live if info.times else -1, len(info.times)]
+        entries.append(
+            f"    {{{_listed(map(str, numbers))}, {listed[0]}, {listed[1]}, {len(info.lag_times)}, {listed[2]}, "
+            f"{listed[3]}}}, /* {info.name} */"
+        )
+    return arrays, "\n".join(entries) or "    {-1, -1, -1, -1, -1, -1, 0, NULL, NULL, 0, NULL, NULL}, /* none */"
 
 
 def constants_source(model: LoadedModel) -> str:

@@ -36,13 +36,14 @@ from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import choose_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.loop import RunFailed
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.run.resolve import check_span, check_transient
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     import pandas
@@ -338,9 +339,9 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     cycles, duration = asked_length(model, cycles, duration)
     check_transient(transient)
     count = len(members)
-    name = driver_angle.speed_name(model.manifest)
+    name = timeline.speed_name(model.manifest)
     speeds = np.zeros(count) if name is None else np.abs(members.columns[name])
-    turns = np.divide(driver_angle.TURN, speeds, out=np.full(count, np.inf), where=speeds > 0.0)
+    turns = np.divide(TURN, speeds, out=np.full(count, np.inf), where=speeds > 0.0)
     durations = np.full(count, duration) if duration is not None else (cycles or 0.0) * turns
     starts = transient * turns if transient > 0.0 else np.zeros(count)
     # the rules of `check_span`, for all members at once

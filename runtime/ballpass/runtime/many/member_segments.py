@@ -16,7 +16,7 @@ from ballpass.runtime.native.ensemble_driver import MemberArrays
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.resolve import SCALED_TURNS
-from ballpass.runtime.run.segments import TURNS_A_SEARCH, WORK
+from ballpass.runtime.run.segments import TURNED, TURNS_A_SEARCH, WORK
 
 #: Windows of `TURNS_A_SEARCH` turns that edges are sought in at a time, over all members of a chunk: about a second's
 #: work.
@@ -35,7 +35,7 @@ def stretches(model: LoadedModel, members: Members, span: Span, which: np.ndarra
     schedule = model.ensemble_driver.schedule
     numbers = {"p": np.ascontiguousarray(members.p[which]), "c": np.ascontiguousarray(members.c[which])}
     values = np.hstack([numbers["p"], numbers["c"]])
-    switching = [k for k, info in enumerate(model.manifest.inputs) if info.kind != "phase"]
+    switching = [k for k, info in enumerate(model.manifest.inputs) if info.kind not in TURNED]
     gates = np.array(switching, dtype=np.int_)
     places = np.arange(len(which))
     windows = max(1, MEMBER_WINDOWS // len(which))

@@ -18,7 +18,8 @@ from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, un
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
 
 Table = Mapping[str, object] | Sequence[Mapping[str, float]] | np.ndarray
 
@@ -177,20 +178,18 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
 
 def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
     """Note members whose tables have knots that do not increase, or not within a turn."""
-    for item in manifest.inputs:
-        if item.kind not in ("table", "table_rate"):
-            continue
-        knots = np.array([columns[name] for name in item.times])
-        wrong = np.any(np.diff(knots, axis=0) <= 0.0, axis=0) | (
-            bool(item.rate) & (knots[-1] - knots[0] >= driver_angle.TURN - driver_angle.ANGLE_RESOLUTION)
-        )
-        for member in np.flatnonzero(wrong).tolist():
-            names = (item.offset, item.rate, *item.times, *item.values)
-            values = {name: float(columns[name][member]) for name in names if name}
-            try:
-                driver_angle.breakpoints((item,), values, 0.0, 1.0)
-            except RequestError as fault:
-                refused[member] = str(fault)
+    tables = [(item.times, item.turns * TURN if item.turning else np.inf) for item in manifest.inputs if item.times]
+    tables += [(times, np.inf) for info in manifest.turnings for times in (info.times, info.lag_times) if times]
+    wrong = np.zeros(len(next(iter(columns.values()))), dtype=bool)
+    for names, most in dict.fromkeys(tables):
+        knots = np.array([columns[name] for name in names])
+        wrong |= np.any(np.diff(knots, axis=0) <= 0.0, axis=0) | (knots[-1] - knots[0] >= most - ANGLE_RESOLUTION)
+    for member in np.flatnonzero(wrong).tolist():
+        values = {name: float(columns[name][member]) for name in timeline.names_of_inputs(manifest)}
+        try:
+            timeline.breakpoints(manifest, values, 0.0, 1.0)
+        except RequestError as fault:
+            refused[member] = str(fault)
 
 
 def _check_assembly(model: LoadedModel, members: Members) -> None:

@@ -26,12 +26,12 @@ from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, r
 from ballpass.runtime.quantity.passages import entering_times
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.sensor import Sensor
 from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.time import timeline
 
 #: Ways to store samples.
 PRECISIONS = ("float32", "float64")
@@ -233,7 +233,7 @@ def _entries(
 
 def _recorded(model: LoadedModel, numbers: Numbers, signals: Signals) -> Run:
     """The recorded part of a run, which takes the steps of the one with samples."""
-    turn = driver_angle.period(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
     request = Request(rtol=signals.rtol, transient_cycles=signals.transient / turn)
     run = resolve(model, numbers, request, duration=float(signals.times[-1]))
     if not math.isfinite(turn):

@@ -12,7 +12,8 @@ import numpy as np
 from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import Turning
 
 #: Names of the inputs of spalls.
 _GATE = "gate."
@@ -36,7 +37,7 @@ def driven_spalls(manifest: Manifest) -> dict[str, str]:
 def entry_times(
     model: LoadedModel, parameters: Mapping[str, np.ndarray], begin: float, end: float
 ) -> dict[str, np.ndarray]:
-    """Times at which a ball reaches a spall, at constant speed; the slip of the cage may change.
+    """Times at which a ball reaches a spall, of a driver whose angle is known; the slip of the cage may change.
 
     Parameters
     ----------
@@ -56,10 +57,10 @@ def entry_times(
         name = item.name.removeprefix(_GATE)
         if name not in spalls:
             continue
-        used = {item.offset, item.rate, *item.times, *item.values, *(edge for pair in item.windows for edge in pair)}
+        used = timeline.names_of_input(model.manifest, item)
         members = [
-            _entries(item, {key: float(columns[key][k]) for key in used}, begin, end)
-            for k in range(len(columns[item.rate]))
+            _entries(model.manifest, item, {key: float(columns[key][k]) for key in used}, begin, end)
+            for k in range(len(columns[used[0]]))
         ]
         found[name] = np.full((len(members), max(1, *map(len, members))), np.nan)
         for row, times in zip(found[name], members, strict=True):
@@ -67,10 +68,13 @@ def entry_times(
     return found
 
 
-def _entries(item: InputInfo, values: Mapping[str, float], begin: float, end: float) -> np.ndarray:
+def _entries(manifest: Manifest, item: InputInfo, values: Mapping[str, float], begin: float, end: float) -> np.ndarray:
     """Times from `begin` to before `end` at which a window opens, increasing [s]."""
-    # a cage that slips keeps its sense
-    edges = {first if values[item.rate] > 0.0 else last for first, last in item.windows}
-    times = [times for edge, times in driver_angle.edge_times(item, values, begin, end) if edge in edges]
+    info = timeline.info_of(manifest, item)
+    times = []
+    for name, passed in timeline.edge_times(manifest, item, values, begin, end):
+        # the edge that opens it is the first where the angle grows there
+        opening = {first: 1.0 for first, _ in item.windows} | {last: -1.0 for _, last in item.windows}
+        times.append(passed[np.sign(Turning.of(info, values).at(passed)[1]) == opening[name]])
     found = np.sort(np.concatenate([np.zeros(0), *times]))
     return found[found < end]

@@ -15,15 +15,26 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.native.driver_library import DOUBLES, LONGS, address, declare
 
 #: Kinds of inputs in the order of schedule.h.
-KINDS = ("phase", "gate", "table", "table_rate", "border")
+KINDS = ("phase", "angle", "rate", "slope", "gate", "table", "table_rate", "border")
 
 #: Moments between edges, and as many evenly spread; as in schedule.h.
 MOMENTS = 32
 
 
+class _ScheduleTurning(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("offset", "rate", "turns", "rolling", "lag", "live", "rows")),
+        ("times", ctypes.c_void_p),
+        ("speeds", ctypes.c_void_p),
+        ("lag_rows", ctypes.c_int),
+        ("lag_times", ctypes.c_void_p),
+        ("lags", ctypes.c_void_p),
+    )
+
+
 class _ScheduleInput(ctypes.Structure):
     _fields_ = (
-        *((name, ctypes.c_int) for name in ("kind", "offset", "rate", "windows")),
+        *((name, ctypes.c_int) for name in ("kind", "turning", "turns", "parts", "windows")),
         ("edges", ctypes.c_void_p),
         ("knots", ctypes.c_int),
         ("times", ctypes.c_void_p),
@@ -31,10 +42,18 @@ class _ScheduleInput(ctypes.Structure):
     )
 
 
-class _Schedule(ctypes.Structure):
+class _Scene(ctypes.Structure):
     _fields_ = (
         ("inputs", ctypes.c_void_p),
         ("count", ctypes.c_int),
+        ("turnings", ctypes.c_void_p),
+        ("turning_count", ctypes.c_int),
+    )
+
+
+class _Schedule(ctypes.Structure):
+    _fields_ = (
+        ("scene", _Scene),
         ("columns", ctypes.c_int),
         ("members", ctypes.c_long),
         ("values", ctypes.c_void_p),
@@ -42,7 +61,7 @@ class _Schedule(ctypes.Structure):
 
 
 #: Records as the library declares them, in the order in which it returns their sizes.
-SCHEDULE_RECORDS = (_Schedule, _ScheduleInput)
+SCHEDULE_RECORDS = (_Schedule, _ScheduleInput, _ScheduleTurning)
 
 
 class MemberSchedule:
@@ -60,17 +79,37 @@ class MemberSchedule:
         place = {name: k for k, name in enumerate(names)} | {"": -1}
         self._kept: list[np.ndarray] = []
 
-        def places(named: tuple[str, ...]) -> int:
+        def places(named: tuple[str, ...]) -> int | None:
+            if not named:
+                return None
             self._kept.append(np.array([place[name] for name in named], dtype=ctypes.c_int))
             return int(self._kept[-1].ctypes.data)
 
+        turnings = {info.name: k for k, info in enumerate(manifest.turnings)}
+        self._turnings = (_ScheduleTurning * max(len(turnings), 1))(
+            *(
+                _ScheduleTurning(
+                    *(place[name] for name in (info.offset, info.rate, info.turns, info.rolling, info.lag)),
+                    -1,
+                    len(info.times),
+                    places(info.times),
+                    places(info.speeds),
+                    len(info.lag_times),
+                    places(info.lag_times),
+                    places(info.lags),
+                )
+                for info in manifest.turnings
+            )
+        )
+        self._turning_count = len(turnings)
         self._count = len(manifest.inputs)
         self._inputs = (_ScheduleInput * max(self._count, 1))(
             *(
                 _ScheduleInput(
                     KINDS.index(item.kind),
-                    place[item.offset],
-                    place[item.rate],
+                    turnings.get(item.turning, -1),
+                    item.turns,
+                    item.parts,
                     len(item.windows),
                     places(tuple(name for window in item.windows for name in window)),
                     len(item.times),
@@ -88,8 +127,9 @@ class MemberSchedule:
 
     def _of(self, values: np.ndarray) -> ctypes.Structure:
         members, columns = values.shape
-        inputs = ctypes.addressof(self._inputs)
-        return _Schedule(inputs, self._count, columns, members, address(values))
+        inputs, turnings = ctypes.addressof(self._inputs), ctypes.addressof(self._turnings)
+        scene = _Scene(inputs, self._count, turnings, self._turning_count)
+        return _Schedule(scene, columns, members, address(values))
 
     def most(self, values: np.ndarray, spans: tuple[np.ndarray, np.ndarray, np.ndarray], *windows: int) -> float:
         """The most segments that `edges` may give."""

@@ -16,7 +16,7 @@ from ballpass.runtime.plot.animation import choose_frames, to_plain
 from ballpass.runtime.plot.html_page import page
 from ballpass.runtime.plot.sliders import sliders
 from ballpass.runtime.plot.solver_columns import solver_columns
-from ballpass.runtime.run.driver_angle import TURN
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel

@@ -19,8 +19,8 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles, ball_angles_along
+from ballpass.runtime.time import timeline
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, MechanismInfo
@@ -103,12 +103,12 @@ class Record:
 
     def table_turns(self, label: str) -> int:
         """Turns of the driver after which the table of a load repeats, named as ``force.gas``."""
-        return driver_angle.table_turns(self._values, label)
+        return dict(self.mechanism.turns).get(label, 1) if self.manifest.mechanism is not None else 1
 
     @property
     def cycle_turns(self) -> int:
         """Turns after which all loads repeat: two for a four-stroke engine."""
-        return driver_angle.cycle_turns(self._values)
+        return timeline.cycle_turns(self.manifest)
 
     def last_turns(self, count: int) -> slice:
         """The last whole turns, at most `count`; the whole record where it holds none."""
@@ -123,8 +123,7 @@ class Record:
         mechanism = self.manifest.mechanism
         if mechanism is not None and mechanism.angle:
             return np.asarray(np.interp(time, self.t, self.solution[mechanism.angle]))
-        start = 0.0 if mechanism is None else self.parameter(mechanism.start_angle)
-        return start + driver_angle.shaft_speed(self.manifest, self._values) * time
+        return np.asarray(timeline.driver(self.manifest, self._values).at(time)[0])
 
     def along(self, window: slice) -> tuple[Array, str]:
         """Axis of some samples and its label: the angle from its first turn on [deg]; the time without turns [ms]."""
@@ -151,17 +150,17 @@ class Record:
         found: list[tuple[str, str]] = []
         bearings = tuple(f"{bearing.path}." for bearing in self.manifest.bearings)
         for item in self.manifest.inputs:
-            turning = item.kind == "table" and item.rate
+            turning = item.kind == "table" and item.turning != ""
             spall = any(edge.startswith(bearings) for window in item.windows for edge in window)
-            if spall or (turning and self.table_turns(item.name) > 1):
+            if spall or (turning and item.turns > 1):
                 continue
             found += _acting_rows(item, self.parameter) if turning else item.windows
         return found
 
     def frequencies(self) -> KinematicFrequencies | None:
-        """Kinematic frequencies of the bearing [Hz]; None without a bearing, or where the speed is a state."""
-        bearing, mechanism = self.bearing, self.manifest.mechanism
-        if bearing is None or (mechanism is not None and mechanism.angle):
+        """Kinematic frequencies of the bearing [Hz]; None without a bearing, or where the speed changes."""
+        bearing = self.bearing
+        if bearing is None or not timeline.is_even(self.manifest, self._values):
             return None
         return frequencies_of(bearing, mean_speeds(self.solution))
 

@@ -21,7 +21,7 @@ from ballpass.runtime.plot.animation import shown_points
 from ballpass.runtime.plot.record import FRAME, Record
 from ballpass.runtime.ratings.of_bearing import inner_ring_mass, rated_element
 from ballpass.runtime.ratings.result_limits import FLATTENED, MOST_DEFLECTION, limit_templates
-from ballpass.runtime.run.driver_angle import speed_name
+from ballpass.runtime.time.timeline import speed_name
 
 
 def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]:

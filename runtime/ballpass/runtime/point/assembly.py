@@ -10,7 +10,8 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -34,22 +35,19 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
-    turn = driver_angle.TURN if mechanism.angle else driver_angle.period(model.manifest, numbers.values)
-    times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
-    margins = _margins(model, numbers, times)
+    moves = timeline.is_free(model.manifest) or timeline.driver(model.manifest, numbers.values).fastest > 0.0
+    angles = TURN * np.arange(ANGLES) / ANGLES if moves else np.zeros(1)
+    margins = _margins(model, numbers, angles)
     faults = []
     for row, info in enumerate(mechanism.margins):
         k = int(np.argmin(margins[:, row]))
-        time, worst = float(times[k]), float(margins[k, row])
-        if worst > 0.0 and len(times) > 1:
-            time, worst = _refine(model, numbers, row, time, turn / ANGLES)
+        angle, worst = float(angles[k]), float(margins[k, row])
+        if worst > 0.0 and moves:
+            angle, worst = _refine(model, numbers, row, angle, TURN / ANGLES)
         if worst <= 0.0:
-            if mechanism.angle:
-                angle = math.degrees(numbers.values[mechanism.start_angle] + time) % 360.0
-            else:
-                angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, time))
+            place = math.degrees(timeline.start_angle(model.manifest, numbers.values) + angle) % 360.0
             faults.append(
-                f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {angle:.2f} deg "
+                f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {place:.2f} deg "
                 f"({info.description}: margin {worst:.4g})."
             )
     if faults:
@@ -85,7 +83,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     heights = margins.tolist()
     if all(height > 0.0 for height in heights):  # NaN: it cannot be assembled
         return
-    angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, t))
+    angle = math.degrees(timeline.crank_angle(model.manifest, numbers.values, t))
     faults = [
         f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
         f"({info.description}: margin {height:.4g})."
@@ -99,26 +97,19 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     )
 
 
-def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:
-    """Margins at times counted from t = 0, shape (times, margins); NaN: it cannot be assembled.
-
-    Where the driver's angle is a state, in place of times angles past the start [rad].
-    """
-    fixed = {"u": driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
-    mechanism = model.manifest.mechanism
-    if mechanism is not None and mechanism.angle:
-        x = driver_angle.turned_states(model.manifest, numbers.values, times)
-        (found,) = model.loop("assembly", ("x",))(len(times), {"x": x, **fixed}).values()
-    else:
-        (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
+def _margins(model: LoadedModel, numbers: Numbers, angles: np.ndarray) -> np.ndarray:
+    """Margins at angles past the start [rad], shape (angles, margins); NaN: it cannot be assembled."""
+    at = timeline.turned(model.manifest, numbers.values, angles)
+    arguments = {"t": 0.0, "p": numbers.p, "c": numbers.c}
+    (found,) = model.loop("assembly", tuple(at))(len(angles), {**at, **arguments}).values()
     return np.where(np.isnan(found), -np.inf, found)
 
 
-def _refine(model: LoadedModel, numbers: Numbers, row: int, time: float, reach: float) -> tuple[float, float]:
-    """Time and value of the minimum of a margin within `reach` of a sample."""
+def _refine(model: LoadedModel, numbers: Numbers, row: int, angle: float, reach: float) -> tuple[float, float]:
+    """Angle and value of the minimum of a margin within `reach` of a sample."""
     for _ in range(SWEEPS):
-        times = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
-        heights = _margins(model, numbers, times)[:, row]
+        angles = angle + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+        heights = _margins(model, numbers, angles)[:, row]
         k = int(np.argmin(heights))
-        time, worst, reach = float(times[k]), float(heights[k]), reach / FINE
-    return time, worst
+        angle, worst, reach = float(angles[k]), float(heights[k]), reach / FINE
+    return angle, worst

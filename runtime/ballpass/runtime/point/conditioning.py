@@ -20,7 +20,8 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -74,37 +75,29 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     ConditioningWarning
         The scaled condition number passes `BOUND`; names the crank angle.
     """
-    mechanism = model.manifest.mechanism
-    by_angle = mechanism is not None and mechanism.angle != ""
-    turn = driver_angle.TURN if by_angle else driver_angle.period(model.manifest, numbers.values)
-    kernel = model.kernel(FUNCTION)
-    span = turn if math.isfinite(turn) else 0.0
+    manifest, kernel = model.manifest, model.kernel(FUNCTION)
+    moves = timeline.is_free(manifest) or timeline.driver(manifest, numbers.values).fastest > 0.0
 
-    def matrix(t: float) -> np.ndarray:
-        """At a time, or at an angle past the start angle."""
-        if by_angle:
-            (x,) = driver_angle.turned_states(model.manifest, numbers.values, np.array([t]))
-            u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)
-            return np.asarray(kernel({"t": 0.0, "x": x, "u": u, "p": numbers.p, "c": numbers.c}))
-        u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t)
-        return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
+    def matrices(angles: np.ndarray) -> np.ndarray:
+        """At angles past the start angle."""
+        at = timeline.turned(manifest, numbers.values, angles)
+        fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
+        return np.array([kernel({**fixed, **{n: rows[k] for n, rows in at.items()}}) for k in range(len(angles))])
 
-    times = span * np.arange(ANGLES) / ANGLES if span else np.zeros(1)
-    matrices = np.array([matrix(float(t)) for t in times])
-    found = []
+    angles = TURN * np.arange(ANGLES) / ANGLES if moves else np.zeros(1)
+    sampled, found = matrices(angles), []
     for condition in (_condition, lambda m: _condition(equilibrate(m))):
-        values = condition(matrices)
+        values = condition(sampled)
         k = int(np.argmax(values))
-        time, largest = float(times[k]), float(values[k])
-        if span and math.isfinite(largest):
-            reach = span / ANGLES
+        angle, largest = float(angles[k]), float(values[k])
+        if moves and math.isfinite(largest):
+            reach = TURN / ANGLES
             for _ in range(SWEEPS):
-                near = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
-                values = condition(np.array([matrix(float(t)) for t in near]))
+                near = angle + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+                values = condition(matrices(near))
                 k = int(np.argmax(values))
-                time, largest, reach = float(near[k]), float(values[k]), reach / FINE
-        start = driver_angle.crank_angle(model.manifest, numbers.values, 0.0 if by_angle else time)
-        found.append((largest, (start + time) % driver_angle.TURN if by_angle else start))
+                angle, largest, reach = float(near[k]), float(values[k]), reach / FINE
+        found.append((largest, (timeline.start_angle(manifest, numbers.values) + angle) % TURN))
     (whole, whole_angle), (equal, equal_angle) = found
     if not equal <= BOUND:
         warnings.warn(

@@ -31,9 +31,10 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.equilibrium_newton import FIRST_STEP, SearchEnd, settle
 from ballpass.runtime.run.request import check_length
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
 
 Array = NDArray[np.float64]
 
@@ -235,9 +236,9 @@ def _with_driver(model: LoadedModel, numbers: Numbers, t: float, names: Sequence
         return np.asarray((states(at + step) - states(at - step)) / (2.0 * step))
 
     def with_number(value: float, name: str) -> Array:
-        return driver_angle.held_states(manifest, model.numbers({**numbers.parameters, name: value}).values, t)
+        return timeline.held_states(manifest, model.numbers({**numbers.parameters, name: value}).values, t)
 
-    by_time = moved(t, lambda at: driver_angle.held_states(manifest, numbers.values, at))
+    by_time = moved(t, lambda at: timeline.held_states(manifest, numbers.values, at))
     x = by_time[:, None] * directions.t
     for column, name in enumerate(names):
         if name in numbers.parameters:
@@ -259,12 +260,12 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         time = checked_time(0.0 if t is None else t)
         if time < 0.0:
             raise RequestError(f"t: {t!r} s lies before the start. Allowed: times from 0 s on.")
-        check_length(time, driver_angle.period(model.manifest, numbers.values))
+        check_length(time, timeline.period(model.manifest, numbers.values))
         return time
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
         raise RequestError(
-            "crank_angle: the driver's angle is a state of this scene, so that no time belongs to it. Give the "
+            "crank_angle: a torque drives this scene, so that no time belongs to an angle. Give the "
             f"angle as the parameter {mechanism.start_angle} instead."
         )
     angle = real(crank_angle)
@@ -275,13 +276,18 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
             f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
             f"to 4 pi; for degrees give math.radians({crank_angle!r})."
         )
-    speed = driver_angle.shaft_speed(model.manifest, numbers.values)
-    past = (angle - driver_angle.crank_angle(model.manifest, numbers.values, 0.0)) * math.copysign(1.0, speed)
-    if speed == 0.0:
-        if abs(math.remainder(past, driver_angle.TURN)) < driver_angle.ANGLE_RESOLUTION:
+    turning, turns = timeline.driver(model.manifest, numbers.values), timeline.cycle_turns(model.manifest)
+    ahead = angle - timeline.crank_angle(model.manifest, numbers.values, 0.0)
+    if turning.fastest == 0.0:
+        if abs(math.remainder(ahead, TURN)) < ANGLE_RESOLUTION:
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
-    return (past % (driver_angle.TURN * driver_angle.cycle_turns(numbers.values))) / abs(speed)
+    if len(turning.begin) == 1:
+        return (math.copysign(1.0, turning.rate[0]) * ahead % (turns * TURN)) / abs(float(turning.rate[0]))
+    passed = turning.first_pass(angle, turns)
+    if passed is None:
+        raise RequestError(f"crank_angle: the driver never passes {angle:.9g} rad by its table of speeds.")
+    return passed
 
 
 def held_coordinates(model: LoadedModel) -> Array:
@@ -391,7 +397,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     extra[_loaded(model)] = applied - own
 
     held = held_coordinates(model)
-    start, velocity = np.split(driver_angle.held_states(model.manifest, numbers.values, t), 2)
+    start, velocity = np.split(timeline.held_states(model.manifest, numbers.values, t), 2)
 
     def force(q: Array) -> Array:
         there["x"] = np.concatenate([q, velocity])

@@ -10,8 +10,8 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembled
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import MOST_TIME, no_output
+from ballpass.runtime.time import timeline
 
 
 def evaluate_point(
@@ -67,7 +67,7 @@ def point(
             f"x: shape ({len(model.states)},) is expected ({', '.join(model.states)}), not {state.shape}"
             f"{'' if np.all(np.isfinite(state)) else ' with NaN or inf'}."
         )
-    u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t)
+    u = timeline.inputs_at(model.manifest, numbers.values, t)
     there: dict[str, float | np.ndarray] = {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
     check_assembled(model, numbers, t, there)
     return there

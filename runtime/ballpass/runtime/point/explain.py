@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError
-from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE, DRIVER_ACCELERATION
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS
@@ -29,9 +29,10 @@ from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
@@ -201,8 +202,8 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     check_assembly(model, numbers)
     values = numbers.values
     manifest = model.manifest
-    turn = driver_angle.period(manifest, values)
-    turns = driver_angle.cycle_turns(values)
+    turn = timeline.period(manifest, values)
+    turns = timeline.cycle_turns(model.manifest)
     span = turns * turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
     length = max(span, _changing(model, values, turn))
     scales, unsupported = _time_scales(model, parameters, span, length) if model.states else ((), ())
@@ -241,46 +242,41 @@ def _changing(model: LoadedModel, values: Mapping[str, float], turn: float) -> f
     """Time over which loads change but with the turn [s]: with tables over time the run, else a harmonic's period."""
     run = model.manifest.run
     length = run.duration or (run.cycles * turn if run.cycles is not None and math.isfinite(turn) else 0.0)
-    if driver_angle.changes_over_time(model.manifest, values, 0.0, length):
+    if timeline.changes_over_time(model.manifest, values, 0.0, length):
         return length
-    return min(length, driver_angle.longest_harmonic(model.manifest, values))
+    return min(length, timeline.longest_harmonic(model.manifest, values))
 
 
 def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, length: float) -> tuple[Breakpoint, ...]:
     found = []
-    inputs, mechanism = model.manifest.inputs, model.manifest.mechanism
-    driven = any(item.name == DRIVER_ACCELERATION for item in inputs)
-    known = mechanism is None or not mechanism.angle or driven
+    manifest, inputs = model.manifest, model.manifest.inputs
     # a little over the turn's end, so that an edge at t = 0 counts once
-    times = driver_angle.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9))
-    timed = driver_angle.rows_over_time(model.manifest, values, span * (1.0 - 1e-9), length)
+    times = timeline.breakpoints(manifest, values, -1e-9 * span, span * (1.0 - 1e-9))
+    timed = timeline.rows_over_time(manifest, values, span * (1.0 - 1e-9), length)
     for time in [*times, *timed]:
-        before = driver_angle.inputs_at(inputs, values, time, time - 1e-7 * span)
-        behind = driver_angle.inputs_at(inputs, values, time, time + 1e-7 * span)
+        before = timeline.inputs_at(manifest, values, time, time - 1e-7 * span)
+        behind = timeline.inputs_at(manifest, values, time, time + 1e-7 * span)
         causes = dict.fromkeys(  # the components of a load share their knots
             f"{item.name.removeprefix('gate.')} {'on' if b > a else 'off'}" if item.kind == "gate" else _knot(item.name)
             for item, a, b in zip(inputs, before, behind, strict=True)
-            if a != b and item.kind in ("gate", "table_rate")
+            if a != b and item.kind in ("gate", "table_rate", "slope")
         )
-        angle = _angle(model, values, float(time)) if known else math.nan
+        angle = math.nan if timeline.is_free(manifest) else _angle(model, values, float(time))
         found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
     return tuple(found)
 
 
 def _angle(model: LoadedModel, values: Mapping[str, float], time: float) -> float:
     """Angle of driver or shaft within the turns after which loads repeat [rad]."""
-    angle, turns = driver_angle.crank_angle(model.manifest, values, time), driver_angle.cycle_turns(values)
-    if turns == 1 or model.manifest.mechanism is None or model.manifest.mechanism.angle:
-        return angle
-    whole = values[model.manifest.mechanism.start_angle] + driver_angle.shaft_speed(model.manifest, values) * time
-    return angle + driver_angle.TURN * (round((whole - angle) / driver_angle.TURN) % turns)
+    turns = timeline.cycle_turns(model.manifest)
+    return float(timeline.driver(model.manifest, values).at(time)[0] % (turns * TURN))
 
 
 def _knot(slope: str) -> str:
     """Words for a knot of the table whose slope is this input, as ``force.punch_slope`` or ``load.x_rate``."""
     if slope == DRIVER_ACCELERATION:
         return "row of the driver's table"
-    if slope.endswith((CAGE_LAG_RATE, CAGE_EXCESS_SLIP)):
+    if slope.endswith(CAGE_EXCESS_SLIP):
         return "row of the cage's slip"
     kind, _, name = slope.rpartition("_")[0].partition(".")
     return f"knot of {'the load' if kind == 'load' else name}"
@@ -297,13 +293,13 @@ def _time_scales(
     even = (np.arange(INSTANTS) + 0.5) / INSTANTS
     times = even * span
     if length > span:
-        rows = driver_angle.rows_over_time(model.manifest, values, 0.0, length)
+        rows = timeline.rows_over_time(model.manifest, values, 0.0, length)
         times = np.concatenate([times, even * length, rows])
     # at the initial position, so that contact forces are those of t = 0 and only the load differs between instants
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
     pull = np.empty(len(times))
     for k, time in enumerate(times):
-        u = driver_angle.inputs_at(model.manifest.inputs, values, float(time))
+        u = timeline.inputs_at(model.manifest, values, float(time))
         free = 1.0 - held_coordinates(model)
         pull[k] = np.linalg.norm(free * model.kernel("rhs")({**point, "u": u})[half:])
     scales, unsupported = [], []

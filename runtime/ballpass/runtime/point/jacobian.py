@@ -26,8 +26,8 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import on_request
+from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]
 
@@ -176,7 +176,7 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
         if name == TIME:
             along_t[0, column] = 1.0
         elif name == CRANK_ANGLE:
-            along_t[0, column] = 1.0 / turning_speed(model, numbers)
+            along_t[0, column] = 1.0 / turning_speed(model, numbers, t)
         elif name in rows:
             along_p[rows[name], column] = 1.0
         else:
@@ -187,8 +187,14 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
         along_c = by_parameters @ along_p
     along_u = np.zeros((len(manifest.inputs), count))
     constants = {info.name: row for row, info in enumerate(manifest.constants)}
-    for row, name, slope in driver_angle.input_derivatives(manifest.inputs, numbers.values, t):
-        along_u[row] += slope * (along_p[rows[name]] if name in rows else along_c[constants[name]])
+    named = timeline.names_of_inputs(manifest)
+    now = np.array([t])
+    for column in range(count):
+        moved = {
+            name: float(along_p[rows[name], column] if name in rows else along_c[constants[name], column])
+            for name in named
+        }
+        along_u[:, column] = timeline.input_slopes(manifest, numbers.values, moved, now, now)[0]
     return JacobianDirections(
         labels=tuple(names),
         units=tuple(units[name] for name in names),
@@ -200,8 +206,8 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
     )
 
 
-def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
-    """Speed of crank or shaft [rad/s].
+def turning_speed(model: LoadedModel, numbers: Numbers, t: float) -> float:
+    """Speed of crank or shaft at a time [rad/s].
 
     Raises
     ------
@@ -213,7 +219,7 @@ def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
         raise RequestError(
             f"crank_angle: the driver's angle is a state of this scene. Differentiate by {mechanism.angle!r} instead."
         )
-    speed = driver_angle.shaft_speed(model.manifest, numbers.values)
+    speed = float(timeline.driver(model.manifest, numbers.values).at(t)[1])
     if speed == 0.0:
         raise RequestError(
             "crank_angle: nothing turns in this scene, so time does not move the angle. Give a speed, or differentiate "

@@ -10,20 +10,21 @@ law.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.contract.manifest import InputInfo
+from ballpass.runtime.contract.manifest import InputInfo, TurningInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import Turning
 
 Array = NDArray[np.float64]
 
@@ -70,13 +71,15 @@ def hessian(
     c = model.symbolic("constants")(symbols["p"]) if model.manifest.constants else ca.SX(0, 1)
     known = {info.name: symbols["p"][k] for k, info in enumerate(model.manifest.parameters)}
     known |= {info.name: c[k] for k, info in enumerate(model.manifest.constants)}
-    u = ca.vertcat(*(_input(item, known, numbers, time) for item in model.manifest.inputs))
+    u = ca.vertcat(*(_input(item, known, model, numbers, time) for item in model.manifest.inputs))
     local = symbols["moved"]
     if CRANK_ANGLE in wrt:
-        turning_speed(model, numbers)
-        speed = driver_angle.speed_name(model.manifest)
-        assert speed is not None  # something turns
-        local = local + symbols["turned"] / known[speed]
+        turning_speed(model, numbers, time)
+        info = timeline.driver_info(model.manifest)
+        assert info is not None  # something turns
+        _, rate, slope = _turned(info, known, numbers.values, time)
+        passed = symbols["turned"] / rate
+        local = local + passed - 0.5 * slope / rate * passed**2
     arguments = {"t": local, "x": symbols["x"], "u": ca.SX(u), "p": symbols["p"], "c": c}
     found = []
     for part in parts:
@@ -114,27 +117,63 @@ def _symbol(model: LoadedModel, numbers: Numbers, symbols: dict[str, ca.SX], nam
     return symbols["p"][list(numbers.parameters).index(name)]
 
 
-def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float) -> ca.SX:
+def _input(item: InputInfo, known: dict[str, ca.SX], model: LoadedModel, numbers: Numbers, t: float) -> ca.SX:
     """An input at the time `t` as a function of parameters: its value there, and what moves it."""
-    if item.kind == "phase":
-        now = float(driver_angle.inputs_at([item], numbers.values, t)[0])
-        # the angle within the turn, for rounding; the subtracted and the added term have the same value
-        whole = numbers.values[item.offset] + numbers.values[item.rate] * t
-        return known[item.offset] + known[item.rate] * t + (now - whole)
-    if item.kind == "border":
-        return ca.SX(0.0)
-    if item.kind == "gate":
-        return ca.SX(float(driver_angle.inputs_at([item], numbers.values, t)[0]))
-    piece = driver_angle.table_piece(item, numbers.values, t)
+    manifest, values = model.manifest, numbers.values
+    now = float(timeline.inputs_over(manifest, values, np.array([t]), np.array([t]), [item])[0, 0])
+    if item.kind in ("border", "gate"):
+        return ca.SX(now)
+    moved, rate, slope = (ca.SX(0.0),) * 3
+    if item.turning:
+        info = timeline.info_of(manifest, item)
+        moved, rate, slope = _turned(info, known, values, t)
+        moved -= float(Turning.of(info, values).at(t)[0])
+    if item.kind in ("phase", "angle"):
+        return now + moved
+    if item.kind in ("rate", "slope"):
+        return rate if item.kind == "rate" else slope
+    piece = timeline.table_piece(manifest, item, values, t)
     if piece.rows[0] == piece.rows[1]:
         return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
     (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))
     # angles are counted beyond a turn; the added whole turns have no derivative
-    t0, t1 = (
-        k + (v - numbers.values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True)
-    )
-    at = ca.SX(piece.argument)
-    if item.rate:
-        at += known[item.offset] + known[item.rate] * t - numbers.values[item.offset] - numbers.values[item.rate] * t
-    slope = (y1 - y0) / (t1 - t0)
-    return slope if item.kind == "table_rate" else y0 + slope * (at - t0)
+    t0, t1 = (k + (v - values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True))
+    steepness = (y1 - y0) / (t1 - t0)
+    return steepness if item.kind == "table_rate" else y0 + steepness * (piece.argument + moved - t0)
+
+
+def _turned(
+    info: TurningInfo, known: dict[str, ca.SX], values: Mapping[str, float], t: float
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Angle, rate and slope of the rate of a turning at a time, over the numbers that it depends on."""
+    one = {**known, "": ca.SX(0.0)}
+    if not info.turns and not info.times:
+        return one[info.offset] + one[info.rate] * t, one[info.rate], ca.SX(0.0)
+    knots = [*(n for n in (*info.times, *info.lag_times) if 0.0 < values[n] <= t)]
+    edges = [ca.SX(0.0), *(one[n] for n in sorted(knots, key=lambda n: values[n])), ca.SX(t)]
+    places = [0.0, *sorted(values[n] for n in knots), t]
+    angle, rate, slope = one[info.offset] - one[info.lag], ca.SX(0.0), ca.SX(0.0)
+    for k, place in enumerate(places[:-1]):
+        speed, steepness = _row(info.times, info.speeds, one, values, place)
+        turns = (one[info.turns] if info.turns else 1.0) - one[info.rolling] * _row(
+            info.lag_times, info.lags, one, values, place
+        )[1]
+        length = edges[k + 1] - edges[k]
+        begin = turns * speed(edges[k])
+        slope = turns * steepness
+        angle += length * (begin + 0.5 * slope * length)
+        rate = begin + slope * length
+    return angle, rate, slope
+
+
+def _row(
+    times: Sequence[str], heights: Sequence[str], one: dict[str, ca.SX], values: Mapping[str, float], place: float
+) -> tuple[Callable[[ca.SX], ca.SX], ca.SX]:
+    """The piece of a table behind a time: a function of time, and its slope; constant outside of the rows."""
+    k = sum(values[name] <= place for name in times)
+    if k in (0, len(times)):
+        height = one[heights[max(k - 1, 0)]] if heights else ca.SX(0.0)
+        return lambda _: height, ca.SX(0.0)
+    left, low = one[times[k - 1]], one[heights[k - 1]]
+    slope = (one[heights[k]] - low) / (one[times[k]] - left)
+    return lambda at: low + slope * (at - left), slope

@@ -12,13 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Multiples that are looked for: of ball passes, of these with sidebands, of the cage (more are ball passes); and the
 #: most shafts or cages to their sides.  With more of them everything would be something.
@@ -96,9 +95,9 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
     """
     at = bearing.path
     speeds = (values[f"{at}.cage_speed"], values.get(f"{at}.outer_pass_speed"), values[f"{at}.inner_pass_speed"])
-    cage, outer, inner = (abs(speeds[0] if v is None else v) / driver_angle.TURN for v in speeds)
+    cage, outer, inner = (abs(speeds[0] if v is None else v) / TURN for v in speeds)
     return KinematicFrequencies(
-        shaft=abs(values[bearing.ring_speed]) / driver_angle.TURN,
+        shaft=abs(values[bearing.ring_speed]) / TURN,
         cage=cage,
         ball_pass_outer=bearing.balls * outer,
         ball_pass_inner=bearing.balls * inner,
@@ -119,22 +118,23 @@ def characteristic_lines(
 
     Notes
     -----
-    Where the speed changes, frequencies are those of the initial one, and orders hold throughout.
+    Where the speed changes, frequencies are those of the speeds given, and orders hold throughout.
     """
-    speed = abs(driver_angle.shaft_speed(manifest, values)) / driver_angle.TURN
+    speed = abs(timeline.shaft_speed(manifest, values)) / TURN
     if speed == 0.0:
         return ()
     unit = speed if orders else 1.0
     shaft = speed / unit
-    parts = driver_angle.cycle_turns(values)
+    parts = timeline.cycle_turns(manifest)
     found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="", parts=parts)]
-    for rate in driver_angle.harmonic_rates(manifest):
-        name = rate.removesuffix(driver_angle.HARMONIC).replace("loads.", "load ")
-        frequency = abs(values[rate]) / driver_angle.TURN / unit
+    for rate, (load, *_) in timeline.loads(manifest).items():
+        frequency = abs(values[rate]) / TURN / unit
         order = frequency / shaft * parts
         if abs(order - round(order)) < LOCKED:
             continue
-        found.append(CharacteristicLine(name=name, bearing="", frequency=frequency, side=shaft, side_name="shaft"))
+        found.append(
+            CharacteristicLine(name=load.words, bearing="", frequency=frequency, side=shaft, side_name="shaft")
+        )
     for bearing in manifest.bearings:
         one = frequencies_of(bearing, values)
         cage, turning = one.cage / unit, one.shaft / unit
@@ -154,28 +154,25 @@ def characteristic_lines(
 
 
 def mean_speeds(solution: Solution) -> Mapping[str, float]:
-    """Parameters and constants with speeds of cages whose slip changes as means over the samples.
+    """Parameters and constants with speeds that change as means over the samples.
 
-    They are those of the slip in the end, which a run need not reach.  Where the driver's speed changes they are those
-    at the initial one, means over its angle.
+    Where a torque drives, they are those at the initial speed, means over its angle.
     """
     manifest, mechanism, ends = solution.manifest, solution.manifest.mechanism, solution.t[[0, -1]]
     found = {**solution.parameters, **solution.constants}
     passed = float(ends[1] - ends[0])
+    if passed > 0.0:
+        found |= timeline.mean_rates(manifest, found, float(ends[0]), float(ends[1]))
     if mechanism is not None and mechanism.angle and found[mechanism.speed] != 0.0:
         first, last = solution[mechanism.angle][[0, -1]]
         passed = float(last - first) / found[mechanism.speed]
     for bearing in manifest.bearings:
         name = f"{bearing.prefix}cage.lag"
-        lags = np.zeros(2)
-        if name in solution.states:
+        if name in solution.states and passed > 0.0:
             lags = solution[name][[0, -1]]
-        for item in manifest.inputs:
-            if item.name == name:
-                lags = driver_angle.inputs_over([item], found, ends, ends)[:, 0]
-        for speed in (f"{bearing.path}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS)):
-            if speed in found and passed > 0.0:
-                found[speed] -= float(lags[1] - lags[0]) / passed
+            for speed in (f"{bearing.path}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS)):
+                if speed in found:
+                    found[speed] -= float(lags[1] - lags[0]) / passed
     return found
 
 
@@ -215,14 +212,14 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
     ----------
     values : parameters and derived constants by name
     """
-    turns, parts = TURNS, driver_angle.cycle_turns(values)
+    turns, parts = TURNS, timeline.cycle_turns(manifest)
     for bearing in manifest.bearings:
         found = frequencies_of(bearing, values)
         order = found.ball_pass_outer / found.shaft if found.shaft > 0.0 else 0.0
         near = abs(order - round(order * parts) / parts)
         if near * MOST > APART:
             turns = max(turns, math.ceil(APART / near))
-    return driver_angle.whole_cycles(values, turns)
+    return timeline.whole_cycles(manifest, turns)
 
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:

@@ -50,11 +50,12 @@ from ballpass.runtime.quantity.passages import Passages, find_passages, find_wra
 from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
 
@@ -189,18 +190,21 @@ class NodeLayer:
         return [self._with_extremes(run, one, row) for one in found]
 
     def _panels(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
-        if layout.still:
-            return uniform_panels(layout.edges, run.turn)
-        mechanism = self.model.manifest.mechanism
+        mechanism, manifest = self.model.manifest.mechanism, self.model.manifest
         angle = "" if mechanism is None else mechanism.angle
 
         def turned(times: Array) -> Array:
+            if not angle:
+                return np.asarray(timeline.driver(manifest, run.numbers.values).at(times)[0] / TURN)
             distinct, back = np.unique(times, return_inverse=True)
             states = stepper_for(self.model, run.kinks).read(layout.kept, distinct)
             found = states[:, self.model.states.index(angle)][back].reshape(times.shape)
-            return np.asarray(found / driver_angle.TURN)
+            return np.asarray(found / TURN)
 
-        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.turn, turned if angle else None)
+        asked = None if timeline.is_even(manifest, run.numbers.values) else turned
+        if layout.still:
+            return uniform_panels(layout.edges, run.turn, asked)
+        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.turn, asked)
 
     def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
         """The run along the nodes of panels; what the layout knows in panels that it has is taken from there."""

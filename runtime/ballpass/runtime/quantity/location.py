@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, CAGE_LAG_RATE, BearingInfo, Manifest
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest, TurningInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
-from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
+from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
 from ballpass.runtime.ratings.of_bearing import TURNS, bearing_words, contact_cosine
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN, Turning
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
 
@@ -81,33 +82,28 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
         return number, asked
     angle = asked.number
     check_instant(manifest, numbers.values, quantity)
-    speed = driver_angle.shaft_speed(manifest, numbers.values)
-    if speed == 0.0:
+    turning = timeline.driver(manifest, numbers.values)
+    if turning.fastest == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
-    start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    cycle = driver_angle.TURN * driver_angle.cycle_turns(numbers.values)
-    cycles = (start + speed * end - angle) / cycle
-    # the last one before the end, an angle at the very end included; 1e-9 of it is rounding
-    whole = math.floor(cycles + 1e-9) if speed > 0.0 else math.ceil(cycles - 1e-9)
-    time = (angle + cycle * whole - start) / speed
-    if time < 0.0:
+    time = turning.last_pass(angle, end, timeline.cycle_turns(manifest))
+    if time is None:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
-    return min(time, end), asked
+    return time, asked
 
 
 def check_instant(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
-    """Raise `RequestError` for an angle where the driver's speed changes."""
+    """Raise `RequestError` for an angle where a torque drives."""
     if quantity.place and named_place(quantity).kind == "angle":
         _refuse_driven(manifest, quantity, "passes an angle when its motion does. Name a time instead, as in @0.41s")
 
 
 def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
-    """Raise `RequestError` for a frequency of a speed that changes, or of a bearing whose rings only swing."""
+    """Raise `RequestError` for a frequency where a torque drives, or of a bearing whose rings only swing."""
     if not quantity.place.endswith("Hz"):
         _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
     if quantity.place in _FREQUENCIES and quantity.place != "shaft":
         bearing = _bearing_of(manifest, quantity)
-        if abs(values[bearing.ring_speed]) <= TURNS * abs(driver_angle.shaft_speed(manifest, values)):
+        if abs(values[bearing.ring_speed]) <= TURNS * abs(timeline.shaft_speed(manifest, values)):
             words = bearing_words("no ball passes", [bearing])
             raise RequestError(
                 f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that {words} "
@@ -122,9 +118,9 @@ def _bearing_of(manifest: Manifest, quantity: Quantity) -> BearingInfo:
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
-    """Refuse a place that needs a constant speed where the driver's changes."""
-    if manifest.mechanism is not None and manifest.mechanism.angle:
-        raise RequestError(f"{quantity.name}: the driver's speed changes in this scene: the driver {words}.")
+    """Refuse a place that needs a speed known before the run."""
+    if timeline.is_free(manifest):
+        raise RequestError(f"{quantity.name}: a torque drives this scene: the driver {words}.")
 
 
 def place_slope(
@@ -142,13 +138,17 @@ def place_slope(
         return end
     if place.kind == "time":
         return np.zeros_like(end)
-    speed = driver_angle.shaft_speed(manifest, numbers.values)
-    name = driver_angle.speed_name(manifest)
-    assert name is not None  # something turns
-    moved = time * slopes(name)
-    if manifest.mechanism is not None:
-        moved = slopes(manifest.mechanism.start_angle) + moved
-    return -moved / speed
+    info = timeline.driver_info(manifest)
+    assert info is not None  # something turns
+    rate = Turning.of(info, numbers.values).at(time)[1]
+    return np.array([-timeline.angle_slope(info, numbers.values, moved, time) / rate for moved in _moved(info, slopes)])
+
+
+def _moved(info: TurningInfo, slopes: Callable[[str], Array]) -> Iterator[dict[str, float]]:
+    """Directions of the numbers that a turning depends on."""
+    columns = {name: slopes(name) for name in timeline.names_of(info)}
+    for k in range(len(next(iter(columns.values())))):
+        yield {name: float(column[k]) for name, column in columns.items()}
 
 
 def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
@@ -159,18 +159,19 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     if form is not None and form["unit"] == "Hz":
         return float(form["number"]), np.zeros(view.directions)
     check_frequency(manifest, values, quantity)
-    speed = driver_angle.shaft_speed(manifest, values)
-    name = driver_angle.speed_name(manifest)
+    values = {
+        **values,
+        **timeline.mean_rates(manifest, values, float(np.min(view.nodes.t)), float(np.max(view.nodes.t))),
+    }
+    speed = timeline.shaft_speed(manifest, values)
+    name = timeline.speed_name(manifest)
     assert name is not None  # something turns
-    faster = view.slopes(name)
+    faster = _rate_slopes(view, name)
     if form is not None or place == "shaft":
         order = 1.0 if form is None else float(form["number"])
-        return order * abs(speed) / driver_angle.TURN, order * math.copysign(1.0, speed) * faster / driver_angle.TURN
+        return order * abs(speed) / TURN, order * math.copysign(1.0, speed) * faster / TURN
     bearing = _bearing_of(manifest, quantity)
     at, what = bearing.path, _FREQUENCIES[place]
-    lag_rate, lag_slope = _mean_lag_rate(view, bearing)
-    turning = (f"{at}.{speed}" for speed in ("cage_speed", *PASS_SPEEDS))
-    values = {**values, **{name: values[name] - lag_rate for name in turning if name in values}}
     frequency = float(getattr(frequencies_of(bearing, values), what))
     if what == "ball_pass_inner":
         of = f"{at}.inner_pass_speed"
@@ -178,7 +179,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
         of = f"{at}.outer_pass_speed"
     else:
         of = f"{at}.cage_speed"
-    moving = view.slopes(of) - lag_slope
+    moving = _rate_slopes(view, of)
     slope = frequency / values[of] * moving if values[of] else 0.0 * moving
     if what == "ball_spin":  # in proportion to cos(contact angle) + pitch/ball
         ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
@@ -191,28 +192,23 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     return frequency, slope
 
 
-def _mean_lag_rate(view: View, bearing: BearingInfo) -> tuple[float, Array]:
-    """Mean rate at which a cage lags its speed in the end [rad/s], and its derivative; 0 where slip is constant.
-
-    Of rings that turn evenly with the driver: no body swings.
-    """
-    values, times = view.numbers.values, view.nodes.t
-    for item in view.manifest.inputs:
-        if item.name in (bearing.prefix + CAGE_LAG_RATE, bearing.prefix + CAGE_EXCESS_SLIP):
-            rows = np.searchsorted([values[name] for name in item.times], times, side="right")
-            slopes = np.zeros((len(times), view.directions))
-            for row in np.unique(rows).tolist():
-                here = rows == row
-                for _, name, amount in driver_angle.input_derivatives([item], values, float(times[here][0])):
-                    slopes[here] += amount * view.slopes(name)
-            mean, slope = view.mean(driver_angle.inputs_over([item], values, times, times)[:, 0], slopes)
-            if item.name.endswith(CAGE_LAG_RATE):
-                return mean, slope
-            turns, turning = f"{bearing.path}.rolling_turns", driver_angle.speed_name(view.manifest)
-            assert turning is not None  # of a linkage
-            faster = values[turns] * view.slopes(turning) + values[turning] * view.slopes(turns)
-            return mean * values[turns] * values[turning], slope * values[turns] * values[turning] + mean * faster
-    return 0.0, np.zeros(view.directions)
+def _rate_slopes(view: View, rate: str) -> Array:
+    """Derivative of a mean speed over the time that counts along the directions, by the name of the first speed."""
+    uneven = (info for info in view.manifest.turnings if info.rate == rate and (info.times or info.turns))
+    info = next(uneven, None)
+    if info is None:
+        return view.slopes(rate)
+    values, nodes = view.numbers.values, view.nodes
+    turning, ends = Turning.of(info, values), [int(np.argmin(nodes.t)), int(np.argmax(nodes.t))]
+    length = float(nodes.t[ends[1]] - nodes.t[ends[0]])
+    before, after = (
+        np.array([timeline.angle_slope(info, values, moved, float(nodes.t[k])) for moved in _moved(info, view.slopes)])
+        + float(turning.at(nodes.t[k])[1]) * nodes.slope[k]
+        for k in ends
+    )
+    longer = nodes.slope[ends[1]] - nodes.slope[ends[0]]
+    mean = turning.mean_rate(float(nodes.t[ends[0]]), float(nodes.t[ends[1]]))
+    return np.asarray((after - before - mean * longer) / length)
 
 
 def is_frequency(manifest: Manifest | None, place: str) -> bool:

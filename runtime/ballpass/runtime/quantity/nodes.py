@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ def with_passages(edges: Edges, times: Array, slopes: Array) -> Edges:
 def turn_slope(run: Run, chain: Chain) -> Array:
     """Derivative of the time of a turn, shape (directions,) [s/unit]; zero when nothing turns."""
     manifest, values = run.model.manifest, run.numbers.values
-    speed, name = driver_angle.shaft_speed(manifest, values), driver_angle.speed_name(manifest)
+    speed, name = timeline.shaft_speed(manifest, values), timeline.speed_name(manifest)
     if name is None or speed == 0.0:
         return np.zeros(len(chain.names))
     return np.asarray(-run.turn / speed * chain.derivative(name))

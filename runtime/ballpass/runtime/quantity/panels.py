@@ -113,16 +113,16 @@ class Panels:
         return self.low[:, None] + span * place, span * width * rate
 
 
-def uniform_panels(edges: Edges, turn: float) -> Panels:
+def uniform_panels(edges: Edges, turn: float, turned: Turned | None) -> Panels:
     """Panels of about one length over the time that counts.
 
     Parameters
     ----------
     turn : time of a turn, infinite where nothing turns [s]
+    turned : as for `panels_of_steps`
     """
-    lengths = np.diff(edges.times)[edges.first :]
-    counts = np.maximum(np.ceil(lengths * FEWEST / min(turn, float(np.sum(lengths)))), 1).astype(int)
-    return split(panels_between(edges, np.zeros(0), np.zeros(0, dtype=bool)), counts)
+    none = np.zeros(0, dtype=bool)
+    return panels_of_steps(edges, np.zeros(0), none, turn, turned)
 
 
 def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None) -> Panels:

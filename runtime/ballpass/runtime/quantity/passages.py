@@ -20,11 +20,12 @@ from ballpass.runtime.quantity.kinks import APART, crossings
 from ballpass.runtime.quantity.nodes import Edges, fixed_nodes, make_edges, place
 from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.loop import segments_of, steps_of
 from ballpass.runtime.run.request import Request, check_memory
 from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def find_passages(run: Run, track: Track) -> Passages:
         left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
         rates = seen["rate"].value[rows, columns]
         # of the fastest turn: one at the first speed of a run-up from rest has no end
-        before = BEFORE / max(BEFORE / before, float(np.max(np.abs(rates))) / driver_angle.TURN)
+        before = BEFORE / max(BEFORE / before, float(np.max(np.abs(rates))) / TURN)
         times = times + left / rates - before
     return Passages(
         times=times,
@@ -134,7 +135,7 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
     parts: dict[str, list[Array]] = {edge: [] for edge in model.manifest.edges}
     for item in model.manifest.inputs:
         if item.kind == "gate":
-            for edge, times in driver_angle.edge_times(item, numbers.values, run.start, run.end):
+            for edge, times in timeline.edge_times(model.manifest, item, numbers.values, run.start, run.end):
                 parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
     if model.manifest.edges:
         passed = _passages_of(run)

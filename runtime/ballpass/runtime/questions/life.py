@@ -114,14 +114,14 @@ def _pressure(
     from ballpass.runtime.ask.wear import load_samples
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of
-    from ballpass.runtime.run.driver_angle import cycle_turns
     from ballpass.runtime.run.request import Request
     from ballpass.runtime.run.resolve import resolve
     from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.time.timeline import cycle_turns
 
     numbers = model.numbers(overrides)
     whole = resolve(model, numbers, Request())
-    turns = cycle_turns(numbers.values) if repeats(model, numbers.values, whole.start) else None
+    turns = cycle_turns(model.manifest) if repeats(model, numbers.values, whole.start) else None
     cycles = None if turns is None else model.run_settings.transient_cycles + turns
     run = resolve(model, numbers, Request(cycles=cycles))
     samples = load_samples(run)[info.prefix]
@@ -140,8 +140,8 @@ def _clearance(
 ) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.run.driver_angle import period, whole_cycles
     from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.time.timeline import period, whole_cycles
 
     name = f"{info.path}.clearance"
     present = model.numbers(overrides).values[name]
@@ -155,7 +155,7 @@ def _clearance(
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
     transient, values = model.run_settings.transient_cycles, model.numbers(overrides).values
     alike = repeats(model, values, transient * period(model.manifest, values))
-    turns = whole_cycles(values, TURNS) if alike else None
+    turns = whole_cycles(model.manifest, TURNS) if alike else None
     cycles = None if turns is None else transient + turns
     found = model.simulate_many(table, [f"{info.prefix}life"], cycles=cycles)
     if found.interrupted:

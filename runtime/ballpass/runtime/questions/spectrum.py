@@ -385,10 +385,11 @@ def spectrum(
     from ballpass.runtime.ask.vibration import kurtogram as kurtogram_of
     from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines, mean_speeds
     from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.time.timeline import is_even
 
     channel, notes, warnings = of or "", tuple[str, ...](), tuple[str, ...]()
     if recording is not None:
-        changing = isinstance(model, Solution) or (model.manifest.mechanism and model.manifest.mechanism.angle)
+        changing = isinstance(model, Solution) or not is_even(model.manifest, model.numbers(parameters).values)
         if changing and (orders or spectrogram or isinstance(model, Solution)):
             raise RequestError(
                 "--recording: its lines are named by a scene, over orders and time by one of constant speed. Allowed: "
@@ -490,8 +491,9 @@ def _recorded(
     from ballpass.runtime.ask.measured import said_numbers
     from ballpass.runtime.contract.column_files import read_columns
     from ballpass.runtime.contract.status import Status
-    from ballpass.runtime.run.driver_angle import TURN, shaft_speed
     from ballpass.runtime.run.solution import Solution, Statistics
+    from ballpass.runtime.time.timeline import shaft_speed
+    from ballpass.runtime.time.turning import TURN
 
     file = read_columns(path)
     t = file.time(time, rate)
@@ -555,7 +557,8 @@ def _measured(run: Solution, of: str, sensor: Sensor) -> np.ndarray:
 
 def _scene_rate(manifest: Manifest, values: Mapping[str, float]) -> float:
     """Samples a second that the scene says [Hz]; 0 where nothing turns."""
-    from ballpass.runtime.run.driver_angle import TURN, shaft_speed
+    from ballpass.runtime.time.timeline import shaft_speed
+    from ballpass.runtime.time.turning import TURN
 
     return manifest.run.samples_per_cycle * abs(shaft_speed(manifest, values)) / TURN
 
@@ -575,8 +578,8 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
     """Turns of a run that separates ball pass from the shaft; None for those of the scene, where turns differ."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
-    from ballpass.runtime.run.driver_angle import period
     from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.time.timeline import period
 
     manifest, values = model.manifest, model.numbers(parameters).values
     turn, settings = period(manifest, values), model.run_settings
@@ -589,15 +592,15 @@ def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: f
 
 def _angle(solution: Solution) -> np.ndarray:
     """Angle of driver or shaft at the samples, counted beyond a turn [rad]."""
-    from ballpass.runtime.run.driver_angle import shaft_speed
+    from ballpass.runtime.time.timeline import driver, start_angle
 
-    mechanism = solution.manifest.mechanism
+    mechanism, values = solution.manifest.mechanism, {**solution.parameters, **solution.constants}
     if mechanism is not None and mechanism.angle:
         return solution[mechanism.angle]
-    speed = shaft_speed(solution.manifest, {**solution.parameters, **solution.constants})
-    if speed == 0.0:
+    turning = driver(solution.manifest, values)
+    if turning.fastest == 0.0:
         raise RequestError("--orders: nothing turns in this scene, so that there are no orders. Omit it.")
-    return np.asarray(speed * solution.t)
+    return np.asarray(turning.at(solution.t)[0] - start_angle(solution.manifest, values))
 
 
 def _peaks(height: np.ndarray, top: int, least: float) -> tuple[int, ...]:

@@ -6,7 +6,8 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 
 def ball_angles(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> list[np.ndarray]:
@@ -33,7 +34,7 @@ def ball_angles_along(model: LoadedModel, numbers: Numbers, times: np.ndarray, s
     given = {
         "t": np.zeros((1, len(times))),  # since the reference times of the inputs' phases, which are `times` themselves
         "x": states.T,
-        "u": driver_angle.inputs_over(model.manifest.inputs, numbers.values, times, times).T,
+        "u": timeline.inputs_over(model.manifest, numbers.values, times, times).T,
         "p": numbers.p,
         "c": numbers.c,
     }
@@ -41,6 +42,6 @@ def ball_angles_along(model: LoadedModel, numbers: Numbers, times: np.ndarray, s
     # a column for each time
     found = np.asarray(model.function("cages")(*(given[name] for name, _ in signature)), dtype=float)
     return [
-        first[:, None] + driver_angle.TURN * np.arange(bearing.balls) / bearing.balls
+        first[:, None] + TURN * np.arange(bearing.balls) / bearing.balls
         for bearing, first in zip(model.manifest.bearings, found, strict=True)
     ]

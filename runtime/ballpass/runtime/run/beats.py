@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.ratings.of_bearing import TURNS, bearing_words
-from ballpass.runtime.run import driver_angle
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Orders of beats: q times the one rate is nearly a multiple of the other.  A load and the shaft, others; and the most
 #: multiples of what is not the shaft [1].
@@ -51,7 +52,7 @@ def beats(manifest: Manifest, values: Mapping[str, float]) -> Iterator[Beat]:
     ----------
     values : parameters and derived constants by name
     """
-    shaft = abs(driver_angle.shaft_speed(manifest, values)) / driver_angle.TURN
+    shaft = abs(timeline.shaft_speed(manifest, values)) / TURN
     if shaft == 0.0:
         return
     balls, loads = list(_passing(manifest, values)), list(_loads(manifest, values))
@@ -77,16 +78,14 @@ def slowest_beat(manifest: Manifest, values: Mapping[str, float], most: float) -
 def _passing(manifest: Manifest, values: Mapping[str, float]) -> Iterator[_Rate]:
     for bearing in manifest.bearings:
         speed = values.get(f"{bearing.path}.outer_pass_speed", values[f"{bearing.path}.cage_speed"])
-        if abs(values[bearing.ring_speed]) > TURNS * abs(driver_angle.shaft_speed(manifest, values)):
+        if abs(values[bearing.ring_speed]) > TURNS * abs(timeline.shaft_speed(manifest, values)):
             whose = f" of {bearing.name}" if bearing.name else ""
-            start = {f"{bearing.path}.ball_angle": 0.5 * driver_angle.TURN / bearing.balls}
+            start = {f"{bearing.path}.ball_angle": 0.5 * TURN / bearing.balls}
             words = bearing_words(f"balls passing the outer ring{whose}", [bearing])
-            yield _Rate(words, bearing.balls * abs(speed) / driver_angle.TURN, start)
+            yield _Rate(words, bearing.balls * abs(speed) / TURN, start)
 
 
 def _loads(manifest: Manifest, values: Mapping[str, float]) -> Iterator[_Rate]:
-    names = [info.name for info in manifest.parameters]
-    for rate in driver_angle.harmonic_rates(manifest):
-        load = rate.removesuffix(driver_angle.HARMONIC)
-        phases = {name: 0.5 * driver_angle.TURN for name in names if name.startswith(f"{load}.phase")}
-        yield _Rate(load.replace("loads.", "load "), abs(values[rate]) / driver_angle.TURN, phases)
+    for rate, infos in timeline.loads(manifest).items():
+        phases = {info.offset: 0.5 * TURN for info in infos}
+        yield _Rate(infos[0].words, abs(values[rate]) / TURN, phases)

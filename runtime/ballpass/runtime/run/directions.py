@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,10 +16,10 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments, Tangents
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.time import timeline
 
 
 class Chain:
@@ -34,10 +33,11 @@ class Chain:
     Attributes
     ----------
     names : as given
+    moved_numbers : numbers that inputs depend on, by name, of each direction
     p, c : derivatives of parameters and derived constants, shapes (parameters, directions), (constants, directions)
     initial : of the states at the start, shape (states, directions)
     moved, stretch : of the time at which driver or shaft reach an angle: at t = 0, and how fast it grows with time,
-        shape (directions,) each; zero where the speed is a state [s/unit], [1/unit]
+        shape (directions,) each; zero where the speed changes [s/unit], [1/unit]
 
     Raises
     ------
@@ -46,7 +46,7 @@ class Chain:
     """
 
     def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str]) -> None:
-        self._inputs = model.manifest.inputs
+        self._manifest = model.manifest
         self._values = numbers.values
         rows = {name: row for row, name in enumerate(numbers.parameters)}
         for name in names:
@@ -66,8 +66,11 @@ class Chain:
         for row, name in enumerate(model.manifest.initial):
             self.initial[row] = self.p[rows[name]]
         self.moved, self.stretch = np.zeros(len(names)), np.zeros(len(names))
-        speed, mechanism = driver_angle.speed_name(model.manifest), model.manifest.mechanism
-        if speed is not None and numbers.values[speed] != 0.0 and not (mechanism is not None and mechanism.angle):
+        named = timeline.names_of_inputs(model.manifest)
+        slopes = np.array([self.derivative(name) for name in named]).reshape(len(named), len(names))
+        self.moved_numbers = [dict(zip(named, column.tolist(), strict=True)) for column in slopes.T]
+        speed, mechanism = timeline.speed_name(model.manifest), model.manifest.mechanism
+        if speed is not None and numbers.values[speed] != 0.0 and timeline.is_even(model.manifest, numbers.values):
             self.stretch = -self.derivative(speed) / numbers.values[speed]
             if mechanism is not None:
                 self.moved = -self.derivative(mechanism.start_angle) / numbers.values[speed]
@@ -88,12 +91,10 @@ class Chain:
         -------
         array, shape (segments, inputs, directions)
         """
-        u = np.zeros((len(times) - 1, len(self._inputs), len(self.names)))
-        for k, (start, end) in enumerate(pairwise(times.tolist())):
-            for row, name, slope in driver_angle.input_derivatives(
-                self._inputs, self._values, start, 0.5 * (start + end)
-            ):
-                u[k, row] += slope * self.derivative(name)
+        starts, middles = times[:-1], 0.5 * (times[:-1] + times[1:])
+        u = np.zeros((len(starts), len(self._manifest.inputs), len(self.names)))
+        for column, moved in enumerate(self.moved_numbers):
+            u[:, :, column] = timeline.input_slopes(self._manifest, self._values, moved, starts, middles)
         return u
 
     def breakpoint(self, time: float) -> np.ndarray | None:
@@ -104,14 +105,13 @@ class Chain:
         RequestError
             Several loads switch at that time, and a parameter moves one of them away from another.
         """
-        edges = driver_angle.breakpoint_derivatives(self._inputs, self._values, time)
+        edges, shifts = timeline.breakpoint_slopes(self._manifest, self._values, self.moved_numbers, time)
         if not edges:
             return None
-        shifts = np.array([sum(slope * self.derivative(name) for name, slope in edge) for edge in edges])
         apart = np.ptp(shifts, axis=0) > 1e-9 * np.max(np.abs(shifts), axis=0)
         if np.any(apart):
             raise RequestError(
-                f"At t = {time:.9g} s several loads switch at once ({', '.join(edge[0][0] for edge in edges)}): the "
+                f"At t = {time:.9g} s several loads switch at once ({', '.join(edges)}): the "
                 f"motion has no derivative along {self.names[int(np.argmax(apart))]}, which moves only some of them. "
                 "Move their edges apart, or differentiate by other parameters."
             )

@@ -11,9 +11,10 @@ import numpy as np
 from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.magnitudes import mass_matrix
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -65,7 +66,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     state : positions and velocities, shape (states,)
     """
     manifest, values = model.manifest, numbers.values
-    crank = driver_angle.crank_angle(manifest, values, time, state)
+    crank = timeline.crank_angle(manifest, values, time, state)
     found = FailureLocation(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found
@@ -73,7 +74,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     for bearing, turned, deflections in zip(
         manifest.bearings, at_balls, ball_deflections(model, numbers, time, state), strict=True
     ):
-        angles = turned % driver_angle.TURN
+        angles = turned % TURN
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
             found = FailureLocation(
@@ -111,7 +112,7 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     names, half = [info.name for info in manifest.states], len(manifest.states) // 2
     driver = names.index(manifest.mechanism.angle)
     edges = [
-        (abs(math.remainder(state[driver] - values[path], driver_angle.TURN)), row, path)
+        (abs(math.remainder(state[driver] - values[path], TURN)), row, path)
         for row, item in enumerate(manifest.inputs)
         if item.kind == "border"
         for window in item.windows
@@ -119,7 +120,7 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
         if path in numbers.parameters  # the driver's; a spall's edges are derived
     ]
     _, row, path = min(edges)
-    u = driver_angle.inputs_at(manifest.inputs, values, 0.0)
+    u = timeline.inputs_at(manifest, values, 0.0)
     u[row] = -math.inf  # open, on either side of the edge
     there = {"t": 0.0, "x": np.concatenate([state[:half], np.zeros(half)]), "u": u, "p": numbers.p, "c": numbers.c}
     acceleration = float(model.kernel("rhs")(there)[half + driver])

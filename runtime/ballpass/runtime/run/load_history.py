@@ -20,13 +20,14 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, TURNED, reduction_rows
 from ballpass.runtime.ratings.life import raceway_life
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, raceway_powers, reduction_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, asked_transient, resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS, repeats
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Relative change of a life that counts as zero [1].
 LIVES = 1e-2
@@ -71,14 +72,14 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         The computation failed.
     """
     manifest = model.manifest
-    turn = driver_angle.period(manifest, numbers.values)
+    turn = timeline.period(manifest, numbers.values)
     transient = asked_transient(model, request.transient_cycles)
     given = request.cycles is not None or request.duration is not None
     doubles = not given and repeats(model, numbers.values, transient * turn)
-    turns: float = driver_angle.whole_cycles(numbers.values, LEAST)
-    slowest = driver_angle.longest_harmonic(manifest, numbers.values) / turn
+    turns: float = timeline.whole_cycles(manifest, LEAST)
+    slowest = timeline.longest_harmonic(manifest, numbers.values) / turn
     beat = slowest_beat(manifest, numbers.values, MOST // 2 * turn) / turn
-    turns = max(turns, driver_angle.whole_cycles(numbers.values, math.ceil(beat)))
+    turns = max(turns, timeline.whole_cycles(manifest, math.ceil(beat)))
     if slowest > 1.0:  # whole periods of the load, as far as there are turns
         turns = slowest * math.ceil(turns / slowest)
     covered, turns = 2 * turns <= MOST, min(turns, MOST // 2)
@@ -114,7 +115,12 @@ def _history(going: ReducedRun) -> LoadHistory:
     """Loads so far."""
     manifest, layout = going.run.model.manifest, reduction_rows(going.run.model.manifest)
     duration = float(going.row[HEAD.index("duration")])
-    speed, fastest = driver_angle.shaft_speed(manifest, going.run.numbers.values), 1.0
+    values, span = going.run.numbers.values, (going.run.start, going.run.start + duration)
+    speed, fastest = timeline.shaft_speed(manifest, values), 1.0
+    if not timeline.one_speed(manifest, values):
+        turning = timeline.driver(manifest, values)
+        speed = turning.mean_rate(*span)
+        fastest = turning.fastest_within(*span) / abs(speed) if speed else 1.0
     if manifest.mechanism is not None and manifest.mechanism.rate:
         rate = reduction_of(layout, going.row, manifest.mechanism.rate, duration)
         speed = rate.mean
@@ -127,7 +133,7 @@ def _history(going: ReducedRun) -> LoadHistory:
         speeds[bearing.prefix] = float(turned) / duration
     return LoadHistory(
         run=replace(going.run, end=going.run.start + duration),
-        turns=duration * abs(speed) / driver_angle.TURN if speed else None,
+        turns=duration * abs(speed) / TURN if speed else None,
         fastest=fastest,
         speeds=speeds,
         change=math.inf,
@@ -141,14 +147,14 @@ def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
     """Loads so far, with the change since the last ones."""
     found = _history(going)
     model, values = going.run.model, going.run.numbers.values
-    moving = {**going.run.numbers.parameters, **driver_angle.set_moving(model.manifest, values)}
+    moving = {**going.run.numbers.parameters, **timeline.set_moving(model.manifest, values)}
     turning = model.numbers(moving).values
     life, peak = 0.0, 0.0
     for bearing in going.run.model.manifest.bearings:
         prefix = bearing.prefix
         now, then = (h.peaks[prefix].maximum for h in (found, before))
         peak = max(peak, abs(1.0 - then / now) if now > 0.0 else 0.0)
-        if not why_no_life(bearing, turning, driver_angle.shaft_speed(model.manifest, turning)):
+        if not why_no_life(bearing, turning, timeline.shaft_speed(model.manifest, turning)):
             ratings = ratings_of(bearing, values)
             rings = ratings.inner_ball, ratings.outer_ball
             life = max(life, _moved(*(raceway_life(rings, h.powers[prefix], ratings.life) for h in (found, before))))

@@ -272,7 +272,7 @@ class RunUnderWay:
                     break
                 goes_on = held is not None
                 if held is None:
-                    rest = rest_of(left, outcome.time, run.model.manifest.inputs, run.numbers)
+                    rest = rest_of(left, outcome.time, run.model.manifest, run.numbers)
                     if rest is None:
                         break
                     left, first_step = rest, outcome.step

@@ -42,9 +42,9 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import Stepper
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
 from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.time import timeline
 
 #: Moments at which equilibria are sought: the most loaded ones of the run.
 LOADED_MOMENTS = 3
@@ -307,4 +307,4 @@ def _moments(
     if len(middles) > MOMENTS:
         middles = middles[np.linspace(0, len(middles) - 1, MOMENTS).astype(int)]
     moments = np.concatenate([middles, begin + horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
-    return driver_angle.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon
+    return timeline.inputs_over(model.manifest, numbers.values, moments, moments), horizon

@@ -16,12 +16,12 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import choose_method
 from ballpass.runtime.run.locating import Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.request import Request, asked_length, check_length, run_length, tolerance
 from ballpass.runtime.run.start import start_state, start_time
+from ballpass.runtime.time import timeline
 
 #: Turns of a run from which the magnitudes of its states are taken.
 SCALED_TURNS = 16
@@ -149,7 +149,7 @@ def resolve(
         The request is wrong; the message says what is allowed.
     """
     settings = model.manifest.run
-    turn = driver_angle.period(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
     transient = asked_transient(model, request.transient_cycles)
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)
     begin, initial = start_time(request.initial), start_state(model, numbers, request.initial)

@@ -15,7 +15,6 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, vector, whole, wrong_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import (
     Request,
     check_length,
@@ -24,6 +23,7 @@ from ballpass.runtime.run.request import (
     run_length,
 )
 from ballpass.runtime.run.start import start_time
+from ballpass.runtime.time import timeline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +66,7 @@ def _sample_times(
     model: LoadedModel, request: Request, values: Mapping[str, float], outputs: Sequence[str]
 ) -> tuple[float, np.ndarray]:
     """Length of the run, and the times of its samples."""
-    begin, turn = start_time(request.initial), driver_angle.period(model.manifest, values)
+    begin, turn = start_time(request.initial), timeline.period(model.manifest, values)
     given = ("samples_per_cycle", "times", "sample_rate")
     several = [f"{name} = {getattr(request, name)!r:.40}" for name in given if getattr(request, name) is not None]
     if len(several) > 1:
@@ -89,7 +89,7 @@ def _sample_times(
         asked = request.samples_per_cycle
         per_cycle = whole("samples_per_cycle", model.manifest.run.samples_per_cycle if asked is None else asked)
         # a run-up has most of its turns behind a slow first one
-        turns = max(duration / turn, driver_angle.turns_passed(model.manifest, values, begin, begin + duration))
+        turns = max(duration / turn, timeline.driver(model.manifest, values).turns(begin, begin + duration))
         wanted = np.rint(float(per_cycle) * turns) if turns > 0.0 else float(per_cycle)
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
@@ -118,7 +118,7 @@ def _sample_times(
             )
     else:
         duration = run_length(model, request, turn)
-        if times[-1] > (begin + duration) * (1.0 + driver_angle.TIME_RESOLUTION):
+        if times[-1] > (begin + duration) * (1.0 + timeline.TIME_RESOLUTION):
             raise RequestError(
                 f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies after it. Run "
                 "longer, or leave cycles and duration out: the run then ends at the last time."

@@ -13,15 +13,19 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from ballpass.runtime.contract.manifest import InputInfo
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
 LARGEST_PHASE = 1e6
+
+#: Inputs that grow within a segment: no load jumps where they go on.
+TURNED = ("phase", "angle", "rate")
 
 #: Turns whose edges are sought at a time: the search compares all with all.
 TURNS_A_SEARCH = 64
@@ -35,7 +39,7 @@ WORK = 7
 
 def time_resolution(begin: float, end: float, turn: float) -> float:
     """Times of a run closer than this are one time [s].  It does not depend on how the run is sampled."""
-    return driver_angle.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
+    return timeline.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
 
 
 def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
@@ -46,8 +50,8 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
     RequestError
         They would not fit into memory, or the times of a table do not increase.
     """
-    check_count(model.manifest.inputs, numbers, end - begin, turn)
-    cuts = driver_angle.breakpoints(model.manifest.inputs, numbers.values, begin, end)
+    fastest = check_count(model.manifest, numbers, end - begin, turn)
+    cuts = timeline.breakpoints(model.manifest, numbers.values, begin, end)
     if math.isfinite(turn):
         near = time_resolution(begin, end, turn)
         whole = turn * np.arange(math.floor(begin / turn) + 1, math.ceil(end / turn))
@@ -57,7 +61,7 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
         right = np.searchsorted(fenced, whole)
         free = (fenced[right] - whole > near) & (whole - fenced[right - 1] > near)
         cuts = np.sort(np.concatenate([cuts, whole[free]]))
-    return _short_of_rounding(model.manifest.inputs, numbers, np.concatenate([[begin], cuts, [end]]))
+    return _short_of_rounding(fastest, np.concatenate([[begin], cuts, [end]]))
 
 
 def edge_windows(
@@ -98,12 +102,12 @@ def run_windows(
     interval : begin and end of the run [s]
     """
     begin, end = interval
-    inputs = model.manifest.inputs
+    manifest = model.manifest
     before: Segments | None = None
     held: Segments | None = None
     for edges in edge_windows(model, numbers, end, turn, start, begin):
-        before = segments = make_segments(inputs, numbers, edges, before)
-        rest = segments if edges[0] >= begin else rest_of(segments, begin, inputs, numbers)
+        before = segments = make_segments(manifest, numbers, edges, before)
+        rest = segments if edges[0] >= begin else rest_of(segments, begin, manifest, numbers)
         if rest is None:
             continue
         held = rest if held is None else _joined([held, rest])
@@ -136,8 +140,10 @@ def _joined(parts: Sequence[Segments]) -> Segments:
     )
 
 
-def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float) -> None:
+def check_count(manifest: Manifest, numbers: Numbers, length: float, turn: float) -> float:
     """Refuse a time with more segments than fit into memory: by their largest possible number, before any is made.
+
+    Returns the rate of the fastest phase [rad/s].
 
     Parameters
     ----------
@@ -148,29 +154,24 @@ def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, tu
     RequestError
         They would not fit.
     """
-    count = 1.0 + length / turn + length * _fastest(inputs, numbers) / LARGEST_PHASE
-    for item in inputs:
-        if item.kind == "gate":
-            count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / driver_angle.TURN)
-        else:
-            turns = 1.0 + length * abs(numbers.values[item.rate]) / driver_angle.TURN if item.rate else 1.0
-            count += len(item.times) * turns
+    rates = {info.name: timeline.fastest(info, numbers.values) for info in manifest.turnings}
+    fastest = float(max(rates.values(), default=0.0))
+    count = 1.0 + length / turn + length * fastest / LARGEST_PHASE
+    for item in manifest.inputs:
+        passed = item.parts * (1.0 + length * rates.get(item.turning, 0.0) / TURN) / item.turns
+        count += (2.0 * len(item.windows) + len(item.times)) * passed
+    count += sum(len(info.times) + len(info.lag_times) for info in manifest.turnings)
     check_memory(
         f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
         count,
-        len(inputs) + WORK,
+        len(manifest.inputs) + WORK,
         "Take a shorter run, or slower loads; `Model.reduce` makes the segments of a few turns at a time.",
     )
+    return fastest
 
 
-def _fastest(inputs: Sequence[InputInfo], numbers: Numbers) -> float:
-    """Rate of the fastest phase [rad/s]."""
-    return max((abs(numbers.values[item.rate]) for item in inputs if item.kind == "phase"), default=0.0)
-
-
-def _short_of_rounding(inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray) -> np.ndarray:
+def _short_of_rounding(fastest: float, edges: np.ndarray) -> np.ndarray:
     """The edges, and more where a phase would get beyond `LARGEST_PHASE` between two: a fast load on a slow shaft."""
-    fastest = _fastest(inputs, numbers)
     parts = np.ceil(np.diff(edges) * fastest / LARGEST_PHASE)
     if not np.any(parts > 1.0) or not np.all(np.isfinite(parts)):
         return edges
@@ -181,9 +182,7 @@ def _short_of_rounding(inputs: Sequence[InputInfo], numbers: Numbers, edges: np.
     return np.concatenate([*pieces, edges[-1:]])
 
 
-def make_segments(
-    inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray, before: Segments | None = None
-) -> Segments:
+def make_segments(manifest: Manifest, numbers: Numbers, edges: np.ndarray, before: Segments | None = None) -> Segments:
     """Segments between edges, with the inputs that hold in them and where a load jumps.
 
     Parameters
@@ -191,8 +190,8 @@ def make_segments(
     edges : shape (segments + 1,), increasing [s]
     before : segments that end where these begin; None: the run begins there
     """
-    u = driver_angle.inputs_over(inputs, numbers.values, edges[:-1], 0.5 * (edges[:-1] + edges[1:]))
-    switching = [k for k, info in enumerate(inputs) if info.kind != "phase"]
+    u = timeline.inputs_over(manifest, numbers.values, edges[:-1], 0.5 * (edges[:-1] + edges[1:]))
+    switching = [k for k, info in enumerate(manifest.inputs) if info.kind not in TURNED]
     jumps = np.ones(len(u), dtype=bool)
     jumps[1:] = np.any(np.diff(u[:, switching], axis=0) != 0.0, axis=1)
     if before is not None:
@@ -209,7 +208,7 @@ def part_of(segments: Segments, first: int, last: int) -> Segments:
     )
 
 
-def rest_of(segments: Segments, time: float, inputs: Sequence[InputInfo], numbers: Numbers) -> Segments | None:
+def rest_of(segments: Segments, time: float, manifest: Manifest, numbers: Numbers) -> Segments | None:
     """The rest of segments from a time within them, at which no load jumps.  None where nothing is left."""
     k = int(np.searchsorted(segments.times, time, side="right")) - 1
     if k >= len(segments.inputs):
@@ -218,5 +217,5 @@ def rest_of(segments: Segments, time: float, inputs: Sequence[InputInfo], number
     left = part_of(segments, k, len(segments.inputs))
     times, u, restarts = left.times.copy(), left.inputs.copy(), left.restarts.copy()
     times[0], restarts[0] = time, False
-    u[0] = driver_angle.inputs_at(inputs, numbers.values, time, float(middle))
+    u[0] = timeline.inputs_at(manifest, numbers.values, time, float(middle))
     return Segments(times=times, inputs=u, restarts=restarts)

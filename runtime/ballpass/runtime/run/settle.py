@@ -20,11 +20,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
@@ -34,6 +32,7 @@ from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.time import timeline
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
 PEAKS, MEANS = 5e-3, 1e-2
@@ -107,17 +106,17 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     """
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
-    turn = driver_angle.period(model.manifest, numbers.values)
-    slowest = driver_angle.longest_harmonic(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
+    slowest = timeline.longest_harmonic(model.manifest, numbers.values)
     slowest = math.ceil(max(slowest, slowest_beat(model.manifest, numbers.values, MOST // 2 * turn)) / turn)
-    turns = driver_angle.whole_cycles(numbers.values, max(LEAST, slowest))
+    turns = timeline.whole_cycles(model.manifest, max(LEAST, slowest))
     if not (real(most) >= 2 * turns and float(most).is_integer()):
         why = f" The slowest harmonic load, or beat, takes {slowest} turns for a period." if slowest > LEAST else ""
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
     transient = asked_transient(model, request.transient_cycles)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
-    if driver_angle.changes_over_time(model.manifest, numbers.values, run.start, run.start + MOST * turn):
+    if timeline.changes_over_time(model.manifest, numbers.values, run.start, run.start + MOST * turn):
         raise RequestError(
             "settle: load, speed or slip of this scene follow a table or a window over time, so that its turns are "
             "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
@@ -197,8 +196,8 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     if few is None:
         few = reduced(run)
     whole = (few.start + few.duration - run.begin) / turn
-    cycle = driver_angle.cycle_turns(run.numbers.values)
-    turns = min(driver_angle.whole_cycles(run.numbers.values, LEAST), int(STEPS * whole / max(few.steps, 1)))
+    cycle = timeline.cycle_turns(model.manifest)
+    turns = min(timeline.whole_cycles(model.manifest, LEAST), int(STEPS * whole / max(few.steps, 1)))
     turns -= turns % cycle
     if turns < 2.0 * few.duration / turn:
         return None
@@ -226,10 +225,10 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
 
 def repeats(model: LoadedModel, values: Mapping[str, float], begin: float) -> bool:
     """Whether turns from a time on [s] are alike: no table gives the speed over time, or changes anything behind it."""
-    turn = driver_angle.period(model.manifest, values)
-    if not math.isfinite(turn) or any(item.name == DRIVER_ACCELERATION for item in model.manifest.inputs):
+    turn = timeline.period(model.manifest, values)
+    if not math.isfinite(turn) or not timeline.one_speed(model.manifest, values):
         return False
-    return not driver_angle.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
+    return not timeline.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
 
 
 def _dropped(transient: float, begin: float, turn: float) -> float:

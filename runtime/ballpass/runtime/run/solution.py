@@ -27,6 +27,7 @@ from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.start import RunEnd
 from ballpass.runtime.show import html
+from ballpass.runtime.time import timeline
 
 if TYPE_CHECKING:
     import pandas
@@ -248,8 +249,8 @@ class Solution:
     @property
     def period(self) -> float | None:
         """Period of the machine [s]; None where nothing turns, or the speed changes."""
-        mechanism = self.manifest.mechanism
-        return None if mechanism is not None and mechanism.angle else self.cycle_length
+        even = timeline.is_even(self.manifest, {**self.parameters, **self.constants})
+        return self.cycle_length if even else None
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions.

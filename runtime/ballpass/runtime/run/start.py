@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
 
 #: Angles of driver and balls that differ by less are equal, up to the rounding of many turns [rad].
 SAME_ANGLE = 1e-9
@@ -76,7 +76,6 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
                 f"are {', '.join(names)}. Give the end of a run of this scene."
             )
         _refuse_jump(model, numbers, given)
-        _check_driver(model, numbers, given.time, given.x)
         return given.x
     initial = vector(given)
     if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
@@ -84,22 +83,7 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
             f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
             f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
         )
-    _check_driver(model, numbers, 0.0, initial)
     return initial
-
-
-def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarray) -> None:
-    """Refuse a start at which the driver does not have the speed of its table."""
-    if all(item.name != DRIVER_ACCELERATION for item in model.manifest.inputs):
-        return
-    assert model.manifest.mechanism is not None  # it has the driver
-    given = float(x[[state.name for state in model.manifest.states].index(model.manifest.mechanism.rate)])
-    speed = driver_angle.driver_at(model.manifest, numbers.values, time)[1]
-    if abs(given - speed) > SAME_ANGLE * max(abs(speed), 1.0):
-        raise RequestError(
-            f"initial: the driver's speed {given:.9g} rad/s was given, and its table has {speed:.9g} rad/s at "
-            f"t = {time:g} s. Give that speed; to continue a run give its end, initial=solution.end."
-        )
 
 
 def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
@@ -112,14 +96,14 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
     angles, others = (
         np.concatenate(
             [
-                [driver_angle.crank_angle(model.manifest, one.values, end.time, end.x)],
+                [timeline.crank_angle(model.manifest, one.values, end.time, end.x)],
                 *ball_angles(model, one, end.time, end.x),
             ]
         )
         for one in (before, numbers)
     )
-    moved = np.abs((others - angles + math.pi) % driver_angle.TURN - math.pi)
-    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / driver_angle.period(model.manifest, numbers.values)):
+    moved = np.abs((others - angles + math.pi) % TURN - math.pi)
+    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / timeline.period(model.manifest, numbers.values)):
         balls = bearing_words("balls", model.manifest.bearings)
         what = "the driver" if moved[0] == np.max(moved) else balls
         raise RequestError(

@@ -22,13 +22,13 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import refuse_full_disk, replaced
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.netcdf import seal
 from ballpass.runtime.run.request import Request, check_length, run_length
 from ballpass.runtime.run.sampling import checked_rate
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution, Statistics, contents
 from ballpass.runtime.run.start import start_time
+from ballpass.runtime.time import timeline
 
 #: Numbers of the samples of a piece, 16 MB; in memory a few times as much is needed.
 PIECE = 2**21
@@ -50,7 +50,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
         The computation failed; the file is as it was.
     """
     rate = checked_rate(0.0 if request.sample_rate is None else request.sample_rate)
-    turn = driver_angle.period(model.manifest, numbers.values)
+    turn = timeline.period(model.manifest, numbers.values)
     begin = start_time(request.initial)
     length = run_length(model, request, turn)
     check_length(begin + length, turn)

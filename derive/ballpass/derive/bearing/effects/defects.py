@@ -15,13 +15,12 @@ exits are known before a run; else steps end where the angle, a function of the 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ballpass.derive.bearing.cage_slip import lag_names
-from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
+from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Passing
 from ballpass.derive.drive import OverAngle
 from ballpass.derive.drive.angle_state import window_gate
@@ -32,7 +31,7 @@ from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
-from ballpass.derive.variables import Input
+from ballpass.derive.variables import Input, Turning
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -120,8 +119,9 @@ class Defects(Effect):
         import sympy as sp
 
         several = [one for spall in effect.parts for one in _contacts(spall, bearing, names)]
-        if passes.even:
-            return OverAngle(value=sp.S.Zero, inputs=tuple(gate for one in several for gate in one.gates))
+        if passes.turnings is not None:
+            gates = (gate for one in several for gate in one.gates(passes.turnings))
+            return OverAngle(value=sp.S.Zero, inputs=tuple(gates))
         found = [gate for one in several for gate in one.switched(passes)]
         return OverAngle(
             value=sp.S.Zero,
@@ -132,7 +132,7 @@ class Defects(Effect):
 
     def constants(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> tuple[Definition, ...]:
         contacts = (one for spall in effect.parts for one in _contacts(spall, bearing, names))
-        return tuple(d for one in contacts for d in one.constants(passes))
+        return tuple(d for one in contacts for d in one.constants())
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
@@ -209,16 +209,9 @@ class _SpallContact:
             return (("", "begin", "middle"), ("_out", "middle", "end"))
         return (("", "begin", "end"),)
 
-    @property
-    def gates(self) -> tuple[Input, ...]:
+    def gates(self, turnings: Mapping[str, Turning]) -> tuple[Input, ...]:
         """One while a ball is within a part of the spall."""
-        prefix = self.names.prefix
-        turning = ("spin_start", "spin_speed") if self.spall.on == "ball" else None
-        offset, rate = (
-            (self.names.constant(n).name for n in turning)
-            if turning
-            else (self._symbol(n).name for n in ("passing_start", "passing_speed"))
-        )
+        prefix, on_ball = self.names.prefix, self.spall.on == "ball"
         of = f" of {self.bearing.name}" if self.bearing.name else ""
         return tuple(
             Input(
@@ -228,11 +221,9 @@ class _SpallContact:
                 unit="1",
                 description=f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}",
                 latex=self.names.latex("g_d"),
-                offset=offset,
-                rate=rate,
+                turning=turnings["spin" if on_ball else self.ring],
+                parts=1 if on_ball else self.bearing.balls,
                 windows=((self._symbol(begin).name, self._symbol(end).name),),
-                times=() if self.bearing.cage is None else tuple(q.path for q in self.bearing.cage.time),
-                values=tuple(symbol.name for symbol, _ in self._lags),
             )
             for part, begin, end in self._edges
         )
@@ -255,13 +246,6 @@ class _SpallContact:
                 windows=[(self._symbol(begin).name, self._symbol(end).name)],
             )
 
-    @property
-    def _lags(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-        """What the lag of a cage whose slip changes adds to the angle of the windows, row by row."""
-        each = ball_turns(self.bearing) if self.spall.on == "ball" else self.bearing.balls
-        lags = lag_names(self.bearing, self.names)
-        return tuple((self._symbol(f"lag.{k}"), -each * lag) for k, lag in enumerate(lags, start=1))
-
     def _gate(self, part: str) -> sp.Symbol:
         import sympy as sp
 
@@ -274,7 +258,7 @@ class _SpallContact:
         inwards = contact_cosine(self.bearing) * ball
         return ball / 2, (pitch + inwards) / 2 if self.ring == "outer" else (pitch - inwards) / 2
 
-    def constants(self, passes: Passing) -> Iterator[Definition]:
+    def constants(self) -> Iterator[Definition]:
         """Half angle, and the edges of the windows: of a raceway's spall times the number of balls."""
         import sympy as sp
 
@@ -285,23 +269,6 @@ class _SpallContact:
         angle = sp.atan2(chord / 2, sp.sqrt(own**2 - chord**2 / 4))
         yield define(half, angle, "rad", f"Half the angle of {words}", "w_d")
         each, what = (sp.S.One, "Angle") if spall.on == "ball" else (balls, "Angle, times the number of balls,")
-        if spall.on != "ball" and passes.even:
-            _, speed = passes.outer if self.ring == "outer" else passes.inner
-            start = symbol_of(self.bearing.ball_angle)
-            yield define(
-                self._symbol("passing_start"),
-                balls * start,
-                "rad",
-                f"Angle of the passes over {words} at the start",
-                r"\eta_0",
-            )
-            yield define(
-                self._symbol("passing_speed"),
-                balls * speed,
-                "rad/s",
-                f"Angular frequency of balls over {words}",
-                r"\omega_d",
-            )
         edges = {"begin": -half, "end": half}
         if spall.shape == "deep path":
             edges["middle"] = sp.S.Zero
@@ -328,9 +295,6 @@ class _SpallContact:
             yield define(
                 self._symbol(name), each * (self.middle + past), "rad", f"{what} of the {place} of {words}", latex
             )
-
-        for k, (symbol, lag) in enumerate(self._lags if passes.even else (), start=1):
-            yield define(symbol, lag, "rad", f"Lag of the cage at {words}, row {k}", rf"\lambda_{{d,{k}}}")
 
     def depth(self, c: sp.Expr, s: sp.Expr, near: sp.logic.boolalg.Boolean) -> sp.Expr:
         """How deep a ball sinks, over cosine and sine of the angle past the middle."""

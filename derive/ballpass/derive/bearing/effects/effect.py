@@ -18,6 +18,7 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Key
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names
+from ballpass.derive.variables import Turning
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,14 +50,14 @@ class GenericBall:
 class Passing:
     """How ball 1 passes over the rings, and its own material over the outer raceway: angle [rad] and its rate [rad/s].
 
-    Where all turns `even`, the rates are constants of a run, of the last row where the cage's slip changes; else they
-    and the angles are functions of the state.
+    `turnings` are these angles by name, "outer", "inner" and "spin", where they are known before a run; None where they
+    are functions of the state.
     """
 
     outer: tuple[sp.Expr, sp.Expr]
     inner: tuple[sp.Expr, sp.Expr]
     spin: tuple[sp.Expr, sp.Expr] | None = None
-    even: bool
+    turnings: Mapping[str, Turning] | None
 
 
 class Effect(ABC):

@@ -179,9 +179,9 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
     instance_of *at = in(instance, INSTANTIATED, "fmi3EnterInitializationMode");
     if (!at) return fmi3Error;
-    if (!(isfinite(startTime) && startTime >= 0.0) || (FMU_STARTS_AT_ZERO && startTime != 0.0) || (stopTimeDefined && !(stopTime > startTime && isfinite(stopTime))))
-        return fail(at, "fmi3EnterInitializationMode: a run from %g s to %g s was asked for. Allowed: %s.", startTime, stopTimeDefined ? stopTime : INFINITY,
-                    FMU_STARTS_AT_ZERO ? "a start at 0, a stop after it" : "a start from 0 on, a stop after it");
+    if (!(isfinite(startTime) && startTime >= 0.0) || (stopTimeDefined && !(stopTime > startTime && isfinite(stopTime))))
+        return fail(at, "fmi3EnterInitializationMode: a run from %g s to %g s was asked for. Allowed: a start from 0 on, a stop after it.", startTime,
+                    stopTimeDefined ? stopTime : INFINITY);
     if (toleranceDefined && !(tolerance >= 1e-13 && tolerance <= 0.1))
         return fail(at, "fmi3EnterInitializationMode: the tolerance %g was given. Allowed: a number from 1e-13 to 0.1.", tolerance);
     at->own.asked = ballpass_default(at->simulation);
@@ -335,13 +335,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     if (at->own.end_known && there - last > 1e-9 * (fabs(last) + communicationStepSize))
         return fail(at, "%s: a step to %.9g s was given. Allowed: times up to the stop time, %.9g s.", call, there, last);
     /* with an unchanged speed results equal those without such an input to the bit */
-    if (FMU_DRIVEN && at->own.speed != ballpass_states(at->simulation)[scene_driver]) at->own.driven = 1;
+    if (FMU_DRIVEN && at->own.speed != ballpass_driver_speed(at->simulation)) at->own.driven = 1;
     if (at->own.driven && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     if (at->early_return) {
         const double next = ballpass_next_switch(at->simulation);
         if (next > here && next < there * (1.0 - 1e-12)) {
             if (at->own.driven) { /* a part of the way to the speed at the end */
-                const double speed = ballpass_states(at->simulation)[scene_driver];
+                const double speed = ballpass_driver_speed(at->simulation);
                 ballpass_drive(at->simulation, speed + (at->own.speed - speed) * (next - here) / (there - here));
             }
             there = next;

@@ -31,7 +31,7 @@ void refuse_unassembled(const double *values, double turn, ballpass_faults *faul
 {
     double inputs[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
     const int turns = isfinite(turn);
-    schedule_inputs(scene_inputs, SCENE_INPUTS, values, 0.0, 0.0, inputs);
+    schedule_inputs(&scene_schedule, values, 0.0, 0.0, inputs);
     for (int row = 0; row < SCENE_MARGINS; row++) {
         double worst = margin_at(values, inputs, row, 0.0), when = 0.0, reach = turn / ANGLES;
         for (int k = 1; turns && k < ANGLES; k++) {

@@ -34,14 +34,15 @@ static const char *const STATUS[] = {
     "the driver has stalled: it comes back to the edge of a window again and again",
 };
 
-enum { PLACES = SCENE_PARAMETERS + SCENE_CONSTANTS + SCENE_INPUTS, INPUTS = SCENE_INPUTS > 0 ? SCENE_INPUTS : 1 };
+/* Behind the angles of the turnings: since when the driver follows speeds that are set, its speed then, its acceleration. */
+enum { ANGLES = SCENE_PARAMETERS + SCENE_CONSTANTS, LIVE = ANGLES + SCENE_TURNINGS, INPUTS = SCENE_INPUTS > 0 ? SCENE_INPUTS : 1 };
 
 /* All independent data of a run. */
 typedef struct {
-    double values[PLACES];
+    double values[LIVE + 3];
     int started, changed, failed;
-    int driven;               /* whether the driver follows speeds that are set, */
-    double wanted, acceleration; /* to this one, at this acceleration */
+    int driven;    /* whether the driver follows speeds that are set, */
+    double wanted; /* to this one */
     ballpass_request asked; /* begin and end: of the time that segments are known for */
     double farther;         /* how much longer that becomes where the end is reached [s] */
     double tolerance[SCENE_STATES];
@@ -171,15 +172,14 @@ int ballpass_set_at(ballpass *s, int place, double value)
     refuse_outside(s, place, value);
     if (s->faults.count) return BALLPASS_REFUSED;
     if (s->run.started && value != s->run.values[place]) {
-        double old[INPUTS];
-        double *values = s->run.values, *angles = values + SCENE_PARAMETERS + SCENE_CONSTANTS;
-        for (int k = 0; k < SCENE_INPUTS; k++) old[k] = scene_inputs[k].rate >= 0 ? values[scene_inputs[k].rate] : 0.0;
+        double old[SCENE_TURNINGS + 1];
+        double *values = s->run.values, *angles = values + ANGLES;
+        for (int k = 0; k < SCENE_TURNINGS; k++) old[k] = values[scene_turnings[k].rate];
         values[place] = value;
         scene_constants(values, values + SCENE_PARAMETERS);
         /* where a rate changes, the angle continues from its value */
-        for (int k = 0; k < SCENE_INPUTS; k++)
-            if (scene_inputs[k].rate >= 0 && values[scene_inputs[k].rate] != old[k])
-                angles[k] += (old[k] - values[scene_inputs[k].rate]) * s->run.time;
+        for (int k = 0; k < SCENE_TURNINGS; k++)
+            if (values[scene_turnings[k].rate] != old[k]) angles[k] += (old[k] - values[scene_turnings[k].rate]) * s->run.time;
         s->run.changed = 1;
     }
     s->run.values[place] = value;
@@ -237,7 +237,7 @@ static double resolution(const ballpass *s)
 static int find_edges(ballpass *s)
 {
     const double *values = s->run.values, turn = time_of_turn(values), length = s->run.asked.end - s->run.asked.begin;
-    const double most = schedule_most_segments(scene_inputs, SCENE_INPUTS, values, length, turn);
+    const double most = schedule_most_segments(&scene_schedule, values, length, turn);
     if (!(most * SEGMENT_NUMBERS <= MOST_NUMBERS)) {
         add_fault(&s->faults,
                   "up to %.10g segments, cut where a load switches and at every whole turn, were asked for. Allowed: %.0f. Take a shorter "
@@ -246,7 +246,7 @@ static int find_edges(ballpass *s)
         return BALLPASS_REFUSED;
     }
     double *edges = NULL;
-    const long count = schedule_edges(scene_inputs, SCENE_INPUTS, values, s->run.asked.begin, s->run.asked.end, turn, &edges);
+    const long count = schedule_edges(&scene_schedule, values, s->run.asked.begin, s->run.asked.end, turn, &edges);
     if (count < 0) {
         add_fault(&s->faults, "the memory is too small for %.0f segments. Allowed: a shorter run.", most);
         return BALLPASS_FAILED;
@@ -261,8 +261,7 @@ static int find_edges(ballpass *s)
 static void inputs_of(const ballpass *s, double start, double middle, double *u)
 {
     u[0] = 0.0;
-    schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, start, middle, u);
-    if (s->run.driven) u[scene_acceleration] = s->run.acceleration;
+    schedule_inputs(&scene_schedule, s->run.values, start, middle, u);
 }
 
 /* Inputs and jumps of the segments of the call at hand. */
@@ -276,7 +275,7 @@ static void find_inputs(ballpass *s)
         const double *past = i > 0 ? u - INPUTS : r->before;
         s->restarts[i] = (unsigned char)(i == 0 && r->first == 0);
         for (int k = 0; k < SCENE_INPUTS; k++)
-            if (scene_inputs[k].kind != SCHEDULE_PHASE && u[k] != past[k]) s->restarts[i] = 1;
+            if (scene_inputs[k].kind > SCHEDULE_RATE && u[k] != past[k]) s->restarts[i] = 1; /* phases and rates go on */
     }
 }
 
@@ -300,7 +299,7 @@ static void find_tolerance(ballpass *s)
     long segments = s->edge_count;
     while (segments > 1 && s->edges[segments] > last) segments--;
     double inputs[2 * SCHEDULE_MOMENTS * INPUTS], magnitude[SCENE_STATES];
-    const int moments = schedule_moments(scene_inputs, SCENE_INPUTS, r->values, s->edges, segments, horizon, inputs);
+    const int moments = schedule_moments(&scene_schedule, r->values, s->edges, segments, horizon, inputs);
     ballpass_magnitudes(r->values, r->values + SCENE_PARAMETERS, r->x, moments, inputs, horizon, magnitude);
     for (int i = 0; i < SCENE_STATES; i++) r->tolerance[i] = r->asked.rtol * magnitude[i];
 }
@@ -347,13 +346,14 @@ static void check_values(ballpass *s)
     double *values = s->run.values;
     if (ballpass_check_bounds(s)) return;
     scene_constants(values, values + SCENE_PARAMETERS);
-    for (int k = 0; k < SCENE_INPUTS; k++) values[SCENE_PARAMETERS + SCENE_CONSTANTS + k] = scene_offsets[k] >= 0 ? values[scene_offsets[k]] : 0.0;
+    for (int k = 0; k < SCENE_TURNINGS; k++) values[ANGLES + k] = scene_offsets[k] >= 0 ? values[scene_offsets[k]] : 0.0;
+    values[LIVE] = NAN;
     for (int k = 0; k < SCENE_CONSTANTS; k++)
         if (!isfinite(values[SCENE_PARAMETERS + k])) {
             refuse(s, "derived constant", scene_constant_names[k], "geometry and elastic constants that make it a finite number.");
             return;
         }
-    if (schedule_fault(scene_inputs, SCENE_INPUTS, values) >= 0)
+    if (schedule_fault(&scene_schedule, values))
         refuse(s, "table", "a knot that is not after the one before", "knots that increase, angles within a turn.");
 #ifdef SCENE_LINKAGE
     if (!s->faults.count) refuse_unassembled(values, time_of_turn(values), &s->faults);
@@ -464,20 +464,41 @@ static int settle(ballpass *s)
     return r->time >= r->asked.end ? go_beyond(s) : start_anew(s, r->asked.end);
 }
 
+/* From the time reached on the driver turns at an acceleration, and all else with it. */
+static void turn_from_here(ballpass *s, double acceleration)
+{
+    double *values = s->run.values, angles[SCENE_TURNINGS + 1];
+    const double speed = ballpass_driver_speed(s);
+    for (int k = 0; k < SCENE_TURNINGS; k++) schedule_angle(&scene_turnings[k], values, s->run.time, &angles[k], NULL);
+    for (int k = 0; k < SCENE_TURNINGS; k++)
+        if (scene_turnings[k].live >= 0) values[ANGLES + k] = angles[k];
+    values[LIVE] = s->run.time;
+    values[LIVE + 1] = speed;
+    values[LIVE + 2] = acceleration;
+    s->run.changed = 1;
+}
+
 int ballpass_drive(ballpass *s, double speed)
 {
     const int refused = must_run(s);
     if (refused) return refused;
-    if (scene_driver < 0 || !isfinite(speed)) {
+    if (scene_driver < 0 || scene_turnings[scene_driver].rows == 0 || !isfinite(speed)) {
         add_fault(&s->faults, "a speed of %g rad/s was given for the driver. Allowed: a finite one, where the scene has a table of its speed.", speed);
         return BALLPASS_REFUSED;
     }
     s->run.wanted = speed;
     if (!s->run.driven) {
-        s->run.driven = s->run.changed = 1;
-        s->run.acceleration = 0.0;
+        s->run.driven = 1;
+        turn_from_here(s, 0.0);
     }
     return BALLPASS_OK;
+}
+
+double ballpass_driver_speed(const ballpass *s)
+{
+    double speed = 0.0;
+    if (scene_driver >= 0) schedule_angle(&scene_turnings[scene_driver], s->run.values, s->run.time, NULL, &speed);
+    return speed;
 }
 
 int ballpass_run_to(ballpass *s, double time)
@@ -490,9 +511,8 @@ int ballpass_run_to(ballpass *s, double time)
         return BALLPASS_REFUSED;
     }
     if (r->driven && time > r->time) {
-        const double acceleration = (r->wanted - r->state[scene_driver]) / (time - r->time);
-        if (acceleration != r->acceleration) r->changed = 1;
-        r->acceleration = acceleration;
+        const double acceleration = (r->wanted - ballpass_driver_speed(s)) / (time - r->time);
+        if (acceleration != r->values[LIVE + 2]) turn_from_here(s, acceleration);
     }
     int fault = settle(s);
     while (!fault) {
@@ -577,7 +597,7 @@ double ballpass_next_switch(ballpass *s)
         inputs_of(s, e[0], 0.5 * (e[0] + e[1]), here);
         inputs_of(s, e[1], 0.5 * (e[1] + e[2]), there);
         for (int k = 0; k < SCENE_INPUTS; k++) {
-            const int even = scene_inputs[k].kind == SCHEDULE_PHASE || scene_inputs[k].kind == SCHEDULE_TABLE; /* slopes tell of its rows */
+            const int even = scene_inputs[k].kind <= SCHEDULE_RATE || scene_inputs[k].kind == SCHEDULE_TABLE; /* slopes tell of its rows */
             if (!even && here[k] != there[k]) return e[1];
         }
     }

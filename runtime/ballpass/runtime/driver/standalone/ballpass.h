@@ -60,6 +60,9 @@ int ballpass_varies(int place);
    constant acceleration [rad/s].  The table is out of use from then on. */
 int ballpass_drive(ballpass *simulation, double speed);
 
+/* Speed of the driver or shaft at the time reached [rad/s]; 0 where a torque drives, or nothing is turned. */
+double ballpass_driver_speed(const ballpass *simulation);
+
 /* The scene's run, of the parameters that are set. */
 ballpass_request ballpass_default(const ballpass *simulation);
 

@@ -14,7 +14,7 @@ static int read_row(ballpass *simulation, double *row)
     const double *p = ballpass_values(simulation);
     ballpass_segment(simulation, &middle);
     /* inputs that belong to this very time */
-    schedule_inputs(scene_inputs, SCENE_INPUTS, p, ballpass_time(simulation), middle, u);
+    schedule_inputs(&scene_schedule, p, ballpass_time(simulation), middle, u);
     scene_drawn(0.0, ballpass_states(simulation), u, p, p + SCENE_PARAMETERS, row + ballpass_columns());
     return BALLPASS_OK;
 }

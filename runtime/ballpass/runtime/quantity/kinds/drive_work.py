@@ -11,8 +11,9 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, View
-from ballpass.runtime.run.driver_angle import TURN, cycle_turns
 from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.time.timeline import cycle_turns, is_even
+from ballpass.runtime.time.turning import TURN
 
 #: Part of a turn by which times miss it by rounding.
 _NEAR = 1e-9
@@ -27,7 +28,7 @@ def whole_cycles(run: Run) -> tuple[float, float] | None:
     They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what counts.
     None where it holds none.
     """
-    cycle = cycle_turns(run.numbers.values)
+    cycle = cycle_turns(run.model.manifest)
     first, last = run.start / run.turn, run.end / run.turn
     for end in (last, math.floor(last + _NEAR)):
         count = cycle * math.floor((end - first) / cycle + _NEAR)
@@ -77,8 +78,8 @@ def _mean_within(view: View, quantity: Quantity, window: tuple[float, float]) ->
     return replace(view, nodes=whole).mean(*view.channel(quantity))
 
 
-def _check(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
-    if manifest.mechanism is not None and manifest.mechanism.angle:
+def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
+    if not is_even(manifest, values):
         raise RequestError(
             f"{quantity.name}: the driver's speed changes in this scene, and its turns are not alike. Ask for "
             "mean:drive_power, times the length of the run."

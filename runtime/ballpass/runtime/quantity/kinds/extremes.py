@@ -14,7 +14,7 @@ import numpy as np
 from ballpass.runtime.quantity.passages import jumps_at
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.run.driver_angle import TURN
+from ballpass.runtime.time.turning import TURN
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0

@@ -19,8 +19,9 @@ from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import KILO, ElementLife, raceway_life
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
-from ballpass.runtime.run.driver_angle import TURN, set_moving, shaft_speed
 from ballpass.runtime.run.reductions import raceway_powers
+from ballpass.runtime.time.timeline import set_moving, shaft_speed
+from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
 
@@ -148,19 +149,19 @@ def _reduced(runs: ReducedRuns, quantity: Quantity) -> Array:
     return np.asarray(raceway_life(_rings(ratings), powers, ratings.life))
 
 
-KINDS = (
-    Kind(
-        name="life",
-        summary="rating life of the bearing in turns, ISO 16281, from the loads at every place of both raceways",
-        words="Rating life",
-        takes="bearing",
-        unit="turns",
-        check=_check,
-        evaluate=life,
-        steep=True,
-        beside=PLACES,
-        reduced=_reduced,
-        needs=lambda channel: (channel.removesuffix("ball.force") + TURNED,),
-        rows=("integral",),
-    ),
+_LIFE = Kind(
+    name="life",
+    summary="rating life of the bearing in turns, ISO 16281, from the loads at every place of both raceways",
+    words="Rating life",
+    takes="bearing",
+    unit="turns",
+    check=_check,
+    evaluate=life,
+    steep=True,
+    beside=PLACES,
+    reduced=_reduced,
+    needs=lambda channel: (channel.removesuffix("ball.force") + TURNED,),
+    rows=("integral",),
 )
+
+KINDS = (_LIFE, replace(_LIFE, name="life_sectors", summary="the same by another name"))

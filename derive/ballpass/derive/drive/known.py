@@ -1,0 +1,179 @@
+"""The drive by a given speed, constant or a table over time: the angle is known before a run.
+
+Angle = angle at the reference time + speed there times the time since then + half the slope of the speed times its
+square; segments of a run end on the rows of a table.  Loads that change with the angle are inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import sympy as sp
+
+from ballpass.derive.drive.angle_state import driver_coordinate
+from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.scene.records import Driver, Shaft
+from ballpass.derive.terms import TIME, Definition, symbol_of
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, Turning
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownDrive(Drive):
+    """A drive whose angle is known.
+
+    Attributes
+    ----------
+    turning : its angle over time
+    passed : what it turned since the reference time [rad]
+    passive : the angle as a coordinate on which nothing depends, in a scene that has no other one; None else
+    whole : the angle with its whole turns, where the speed changes [rad]
+    """
+
+    turning: Turning
+    passed: sp.Expr
+    passive: Coordinate | None = None
+    whole: sp.Expr | None = None
+
+    @property
+    def even(self) -> bool:
+        """Whether the speed is constant."""
+        return not self.turning.times
+
+    def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
+        """An input."""
+        gate = Input(
+            name=f"gate.{name}",
+            symbol=sp.Symbol(f"gate.{name}", real=True),
+            kind="gate",
+            unit="1",
+            description=f"1 while {name} acts, else 0",
+            latex=rf"g_{{\mathrm{{{name}}}}}",
+            turning=self.turning,
+            windows=tuple(windows),
+        )
+        return OverAngle(value=gate.symbol, inputs=(gate,))
+
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
+        """Value at the reference time, plus slope over the angle times the angle turned since then."""
+
+        def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
+            return Input(
+                name=f"{name}{ending}",
+                symbol=sp.Symbol(f"input.{name}{ending}", real=True),
+                kind=kind,
+                unit=unit,
+                description=f"{words} of the table of {name} at the reference time",
+                latex=rf"{latex}_{{0,\mathrm{{{name}}}}}",
+                turning=self.turning,
+                turns=turns,
+                times=tuple(angles),
+                values=tuple(values),
+            )
+
+        value = entry("table", "", unit, "Value", "T")
+        slope = entry("table_rate", "_slope", f"{unit}/rad", "Slope over the driver's angle", "T'")
+        return OverAngle(value=value.symbol + slope.symbol * self.passed, inputs=(value, slope))
+
+
+def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
+    """Drive of a driver with a speed or a table of it, and a start angle.
+
+    Parameters
+    ----------
+    alone : whether nothing else has states; the driver's angle by a table is then integrated along, for runs need one
+    """
+    words = "Angle of the driven body at the reference time"
+    speeds: tuple[str, ...] = (driver.speed.path,)
+    times: tuple[str, ...] = ()
+    if driver.table is not None:
+        speeds = (*speeds, *(q.path for q in driver.table.later_speed))
+        times = tuple(q.path for q in driver.table.time)
+    turning = Turning(
+        name="driver",
+        kind="driver",
+        words="the driver",
+        offset=driver.start_angle.path,
+        rate=driver.speed.path,
+        times=times,
+        speeds=speeds,
+    )
+    start = turning.phase(words, r"\theta_{1,0}")
+    if not times:
+        passed = symbol_of(driver.speed) * TIME
+        angle = _angle(start, passed)
+        return KnownDrive(
+            speed=symbol_of(driver.speed),
+            acceleration=sp.S.Zero,
+            description="the driver's speed is constant",
+            definitions=(angle,),
+            inputs=(start,),
+            turning=turning,
+            passed=passed,
+        )
+    rate = turning.rate_input("Speed of the driven body at the reference time", r"\omega_{1,0}")
+    slope = Input(
+        name=DRIVER_ACCELERATION,
+        symbol=sp.Symbol("input.driver.acceleration", real=True),
+        kind="slope",
+        unit="rad/s^2",
+        description="Slope of the table of the driver's speed over time",
+        latex=r"\alpha_1",
+        turning=turning,
+    )
+    speed = Definition(
+        symbol=sp.Symbol("driver.rate", real=True),
+        expression=rate.symbol + slope.symbol * TIME,
+        unit="rad/s",
+        description="Speed of the driven body",
+        latex=r"\omega_1",
+    )
+    passed = (rate.symbol + slope.symbol * TIME / 2) * TIME
+    whole = turning.whole("Angle of the driven body, whole turns counted", r"\theta_{1,0}")
+    passive = replace(driver_coordinate(), position=sp.Symbol("state.driver.angle", real=True)) if alone else None
+    return KnownDrive(
+        speed=speed.symbol,
+        acceleration=slope.symbol,
+        description="slope of the table of the driver's speed",
+        definitions=(_angle(start, passed), speed),
+        inputs=(start, rate, slope, *(() if alone else (whole,))),
+        flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),
+        turning=turning,
+        passed=passed,
+        passive=passive,
+        whole=whole.symbol + passed if passive is None else passive.position,
+    )
+
+
+def _angle(start: Input, passed: sp.Expr) -> Definition:
+    return Definition(
+        symbol=DRIVER_ANGLE,
+        expression=start.symbol + passed,
+        unit="rad",
+        description="Angle of the driven body",
+        latex=r"\theta_1",
+    )
+
+
+def shaft_drive(shaft: Shaft) -> KnownDrive:
+    """The shaft's angle, zero at t = 0."""
+    turning = Turning(
+        name="shaft",
+        kind="driver",
+        words="the shaft",
+        offset="shaft.start_angle",
+        rate=shaft.speed.path,
+        speeds=(shaft.speed.path,),
+    )
+    speed = symbol_of(shaft.speed)
+    return KnownDrive(
+        angle=sp.Symbol("shaft.angle", real=True),
+        speed=speed,
+        acceleration=sp.S.Zero,
+        description="the shaft's speed is constant",
+        inputs=(turning.phase("Angle of the shaft at the reference time", r"\theta_0"),),
+        turning=turning,
+        passed=speed * TIME,
+    )

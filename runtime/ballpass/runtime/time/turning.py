@@ -1,0 +1,286 @@
+"""Angles that are known before a run: each a piecewise quadratic function of time, with its whole turns kept.
+
+In: names of the manifest, values.  Out: a `Turning`: where it stands, when it passes an angle, how many turns a span
+has.
+
+Values may be complex: a number moved by `STEP` along a direction gives that derivative as the imaginary part of a
+result over `STEP`, exact to rounding (doi:10.1145/838250.838251).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import TurningInfo
+
+TURN = 2.0 * math.pi
+
+#: Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there.
+ANGLE_RESOLUTION = 1e-11
+
+#: Turns whose passages are listed at once; each takes eight bytes.
+MOST_TURNS = 1e7
+
+#: Imaginary step of derivatives [1].
+STEP = 1e-60
+
+Values = Mapping[str, Any]
+
+#: Begin, and no acceleration, of what turns at one rate.
+_START = np.zeros(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turning:
+    """An angle over time: in piece k, ``angle + rate s + half s^2`` with ``s = t - begin``.
+
+    Attributes
+    ----------
+    begin, angle, rate, half : of each piece, shape (pieces,); the first one holds before its begin as well [s], [rad]
+    parts : into how many parts that look alike a turn falls: the balls of a cage
+
+    Examples
+    --------
+    >>> from ballpass.runtime.time.turning import Turning
+    >>> at_rest_then_fast = Turning.by_speeds(0.0, [0.0, 2.0], [0.0, 10.0])
+    >>> [float(x) for x in at_rest_then_fast.at(3.0)]  # angle [rad] and rate [rad/s]
+    [20.0, 10.0]
+    """
+
+    begin: np.ndarray
+    angle: np.ndarray
+    rate: np.ndarray
+    half: np.ndarray
+    parts: int = 1
+
+    @classmethod
+    def even(cls, offset: Any, rate: Any, parts: int = 1) -> Turning:
+        """At one rate, from t = 0 on."""
+        return cls(begin=_START, angle=np.array([offset]), rate=np.array([rate]), half=_START, parts=parts)
+
+    @classmethod
+    def by_speeds(cls, offset: Any, times: Any, speeds: Any, parts: int = 1) -> Turning:
+        """By rows of its speed, linear between them and constant outside; `offset` at t = 0."""
+        return cls._integrated(
+            offset, np.asarray(times), np.asarray(speeds), (np.zeros(0), np.zeros(0)), (1.0, 0.0), parts
+        )
+
+    @classmethod
+    def of(cls, info: TurningInfo, values: Values) -> Turning:
+        """A turning of the manifest.
+
+        Raises
+        ------
+        RequestError
+            Times of a table do not increase.
+        """
+        offset = values[info.offset] if info.offset else 0.0
+        if not info.turns and not info.times:
+            return cls.even(offset, values[info.rate], info.parts)
+        rows, slips = knots(info.times, values), knots(info.lag_times, values)
+        speeds = np.array([values[name] for name in info.speeds] or [0.0])
+        lags = np.array([values[name] for name in info.lags])
+        shares = (values[info.turns] if info.turns else 1.0, values[info.rolling] if info.rolling else 0.0)
+        return cls._integrated(
+            offset - (values[info.lag] if info.lag else 0.0), rows, speeds, (slips, lags), shares, info.parts
+        )
+
+    @classmethod
+    def _integrated(
+        cls,
+        offset: Any,
+        times: np.ndarray,
+        speeds: np.ndarray,
+        lag: tuple[np.ndarray, np.ndarray],
+        shares: tuple[Any, Any],
+        parts: int,
+    ) -> Turning:
+        """Shares of a speed, the second times the slope of a lag, integrated over time."""
+        all_knots = np.concatenate([np.zeros(1), times[times.real > 0.0], lag[0][lag[0].real > 0.0]])
+        begin = all_knots[np.unique(all_knots.real, return_index=True)[1]]
+        row, slope = _pieces(times, speeds, begin)
+        speed = speeds[row] + slope * (begin - times[row]) if len(times) else np.full(len(begin), speeds[0])
+        turned = shares[0] - shares[1] * _pieces(*lag, begin)[1]
+        rate, half, length = turned * speed, 0.5 * turned * slope, np.diff(begin)
+        passed = np.cumsum(length * (rate[:-1] + length * half[:-1]))
+        angle = offset + np.concatenate([np.zeros(1), passed])
+        return cls(begin=begin, angle=angle, rate=rate, half=half, parts=parts)
+
+    @property
+    def _is_even(self) -> bool:
+        return self.begin.size == 1 and not self.half[0]
+
+    def times(self, multiple: int) -> Turning:
+        """So many times the angle."""
+        if multiple == 1:
+            return self
+        return Turning(
+            begin=self.begin,
+            angle=multiple * self.angle,
+            rate=multiple * self.rate,
+            half=multiple * self.half,
+            parts=self.parts,
+        )
+
+    def _piece(self, t: Any) -> Any:
+        if self.begin.size == 1:
+            return 0
+        return np.maximum(np.searchsorted(self.begin.real, t, side="right") - 1, 0)
+
+    def at(self, t: Any) -> tuple[Any, Any]:
+        """Angle with its whole turns [rad], and rate [rad/s]."""
+        k = self._piece(t)
+        s = t - self.begin[k]
+        return self.angle[k] + s * (self.rate[k] + s * self.half[k]), self.rate[k] + 2.0 * s * self.half[k]
+
+    def held(self, t: Any, inside: Any) -> tuple[Any, Any, Any]:
+        """Angle [rad], rate [rad/s] and slope of the rate [rad/s^2] at `t`, of the piece that holds at `inside` [s]."""
+        k = self._piece(inside)
+        s = t - self.begin[k]
+        angle = self.angle[k] + s * (self.rate[k] + s * self.half[k])
+        return angle, self.rate[k] + 2.0 * s * self.half[k], 2.0 * self.half[k]
+
+    def within(self, t: Any, first: Any = 0.0, turns: int = 1) -> Any:
+        """Angle past `first`, less whole turns, or whole times so many; rounding before an edge counts as the edge."""
+        return past(self.at(t)[0], first, turns)
+
+    def turns(self, begin: float, end: float) -> float:
+        """Turns in a span, in either sense [1]."""
+        if self._is_even:
+            return abs(float(self.rate[0])) * (end - begin) / TURN
+        return float(np.sum(np.abs(np.diff(self.at(self._edges(begin, end))[0])))) / TURN
+
+    def mean_rate(self, begin: float, end: float) -> float:
+        """Over a span [rad/s]."""
+        first, last = self.at(np.array([begin, end]))[0]
+        return float(last - first) / (end - begin)
+
+    def fastest_within(self, begin: float, end: float) -> float:
+        """Largest rate in a span, in either sense [rad/s]."""
+        inner = self.begin[(begin < self.begin) & (self.begin < end)]
+        return float(np.max(np.abs(self.at(np.concatenate([[begin], inner, [end]]))[1])))
+
+    @property
+    def fastest(self) -> float:
+        """Largest rate, in either sense [rad/s]."""
+        return (
+            abs(float(self.rate[0].real)) if self.begin.size == 1 else self.fastest_within(0.0, float(self.begin[-1]))
+        )
+
+    def passes(self, angle: float, begin: float, end: float, turns: int = 1) -> np.ndarray:
+        """Times in a span at which it passes an angle, modulo so many turns, increasing [s].
+
+        Raises
+        ------
+        RequestError
+            More than `MOST_TURNS` turns.
+        """
+        edges = [begin, end]
+        if self._is_even:  # of Python's numbers, which overflow without a word
+            angle_0, rate_0 = float(self.angle[0]), float(self.rate[0])
+            places = [angle_0 + rate_0 * begin, angle_0 + rate_0 * end]
+        else:
+            edges = self._edges(begin, end).tolist()
+            places = self.at(np.array(edges))[0].tolist()
+        passed = sum(abs(last - first) for first, last in pairwise(places)) / TURN
+        if not passed <= MOST_TURNS:
+            raise RequestError(
+                f"Between {begin:g} s and {end:g} s lie {passed:.3g} turns, too many to list what switches in them. "
+                f"Allowed: up to {MOST_TURNS:g}. Ask for a shorter time."
+            )
+        period, found = turns * TURN, []
+        for (left, right), ends in zip(pairwise(edges), pairwise(places), strict=True):
+            low, high = ((e - angle) / period for e in sorted(ends))
+            whole = np.arange(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)
+            found.append(self._when(angle, period * whole, left, right).clip(left, right))
+        return np.unique(np.concatenate(found)) if len(found) > 1 else found[0]
+
+    def first_pass(self, angle: float, turns: int = 1) -> float | None:
+        """The first time from t = 0 on at which it passes an angle, modulo so many turns [s]; None without one."""
+        period, last = turns * TURN, float(self.begin[-1])
+        # from the last piece's begin on it turns at one rate
+        end = last + (2.0 * period / abs(self.rate[-1]) if self.rate[-1] else 1.0)
+        for left, right in pairwise(self._edges(0.0, end).tolist()):
+            first, later = ((e - angle) / period for e in self.held(np.array([left, right]), 0.5 * (left + right))[0])
+            whole = math.ceil(first - 1e-12) if later >= first else math.floor(first + 1e-12)
+            if min(first, later) - 1e-12 <= whole <= max(first, later):
+                for time in self._when(angle, np.array([period * whole]), left, right):
+                    return float(min(max(time, left), right))
+        return None
+
+    def last_pass(self, angle: float, end: float, turns: int = 1) -> float | None:
+        """The last time from t = 0 to `end` at which it passes an angle, modulo so many turns [s]; None without one."""
+        period = turns * TURN
+        for left, right in reversed([*pairwise(self._edges(0.0, end).tolist())]):
+            first, last = ((e - angle) / period for e in self.held(np.array([left, right]), 0.5 * (left + right))[0])
+            # an angle at the very end included; 1e-9 of a turn is rounding
+            whole = math.floor(last + 1e-9) if last >= first else math.ceil(last - 1e-9)
+            if min(first, last) - 1e-9 <= whole <= max(first, last) + 1e-9:
+                for time in self._when(angle, np.array([period * whole]), left, right):
+                    return float(min(max(time, left), right))
+        return None
+
+    def _when(self, angle: float, whole: np.ndarray, left: float, right: float) -> np.ndarray:
+        """Times at which it is at an angle plus whole turns, in a part of a piece where it grows or falls [s]."""
+        middle = 0.5 * (left + right)
+        k = int(self._piece(middle))
+        rate, half, ahead = self.rate[k], self.half[k], (angle - self.angle[k]) + whole
+        if half == 0.0:
+            return np.zeros(0) if rate == 0.0 else np.asarray(self.begin[k] + ahead / rate)
+        root = np.sqrt(np.maximum(rate * rate + 4.0 * half * ahead, 0.0))
+        sense = math.copysign(1.0, rate + 2.0 * half * (middle - self.begin[k]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            roots = self.begin[k] + 2.0 * ahead / (rate + sense * root)
+        # where it turns back both roots meet
+        return np.asarray(np.where(rate + sense * root == 0.0, self.begin[k] - 0.5 * rate / half, roots))
+
+    def _edges(self, begin: float, end: float) -> np.ndarray:
+        """The span, cut into parts in which the angle grows or falls."""
+        if self._is_even:
+            return np.array([begin, end])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            back = self.begin - 0.5 * self.rate / self.half
+        edges = np.concatenate([self.begin[1:], back[(self.half != 0.0) & (back > self.begin)]])
+        return np.unique(np.concatenate([[begin], edges[(begin < edges) & (edges < end)], [end]]))
+
+
+def past(angle: Any, first: Any = 0.0, turns: int = 1) -> Any:
+    """An angle past another, less whole turns or whole times so many; rounding before an edge counts as the edge."""
+    period = turns * TURN
+    ahead = np.asarray(angle - first)
+    rest = np.mod(ahead.real, period)
+    rest = np.where(period - rest < ANGLE_RESOLUTION, 0.0, rest)
+    return rest if ahead.dtype.kind != "c" else rest + 1j * ahead.imag
+
+
+def knots(names: tuple[str, ...], values: Values, word: str = "times", unit: str = "s") -> np.ndarray:
+    """Values that increase, of the rows of a table.
+
+    Raises
+    ------
+    RequestError
+        They do not.
+    """
+    found = np.array([values[name] for name in names]) if names else np.zeros(0)
+    steps = np.diff(found.real)
+    if np.any(steps <= 0.0):
+        k = int(np.argmax(steps <= 0.0))
+        raise RequestError(
+            f"The {word} of a table must increase: {names[k + 1]} = {found[k + 1].real:g} {unit} was given after "
+            f"{names[k]} = {found[k].real:g} {unit}. Change one of the two."
+        )
+    return found
+
+
+def _pieces(at: np.ndarray, heights: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row from which a table goes on behind each time, and its slope there: zero outside of the rows."""
+    behind = np.searchsorted(at.real, begin.real, side="right")
+    slopes = np.concatenate([np.zeros(1), np.diff(heights) / np.diff(at), np.zeros(1)]) if len(at) else np.zeros(1)
+    return np.clip(behind - 1, 0, None), slopes[behind]
