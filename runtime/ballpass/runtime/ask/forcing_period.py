@@ -73,8 +73,13 @@ def _rate(info: TurningInfo, values: Mapping[str, float]) -> float:
     return float(Turning.of(info, values).rate[-1])
 
 
-def refuse_free_driver(manifest: Manifest, question: str) -> None:
-    """Refuse a scene where the driver's motion or a cage's lag is a state: no period."""
+def refuse_free_driver(manifest: Manifest, values: Mapping[str, float], question: str) -> None:
+    """Refuse a scene where the driver's motion or a cage's lag is a state, or its speed changes: no period."""
+    if not timeline.one_speed(manifest, values):
+        raise RequestError(
+            f"{question}: the driver's speed changes by its table, and turns are counted at its first speed. Allowed: "
+            "a constant speed, or rows of equal speed: that of the last row, say (--set)."
+        )
     if timeline.is_free(manifest):
         raise RequestError(
             f"{question}: a torque drives in this scene, and the driver's motion is a state. Allowed: a driver or "

@@ -261,8 +261,10 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, l
             for item, a, b in zip(inputs, before, behind, strict=True)
             if a != b and item.kind in ("gate", "table_rate", "slope")
         )
+        if not causes:  # a row at which nothing changes
+            continue
         angle = math.nan if timeline.is_free(manifest) else _angle(model, values, float(time))
-        found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
+        found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes)))
     return tuple(found)
 
 

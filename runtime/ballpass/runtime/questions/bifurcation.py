@@ -232,7 +232,6 @@ def bifurcation(
     from ballpass.runtime.run.locating import refuse_jumps
 
     manifest = model.manifest
-    refuse_free_driver(manifest, "bifurcation")
     if exponent:
         refuse_jumps(manifest, "bifurcation with an exponent")
     chosen = parameter_range(manifest.parameters, "vary", vary, counted=True)
@@ -240,6 +239,8 @@ def bifurcation(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
+    for end in (chosen.low, chosen.high):
+        refuse_free_driver(manifest, model.numbers({**overrides, chosen.name: end}).values, "bifurcation")
     step_of, every, drifts_of = _strobe(model, overrides, chosen)
     stopped, done = Event(), [0]
 

@@ -243,8 +243,8 @@ def section(
     from ballpass.runtime.time.timeline import cycle_turns
 
     manifest = model.manifest
-    refuse_free_driver(manifest, "section")
     turn, numbers = model.period(parameters or {}), model.numbers(parameters or {})
+    refuse_free_driver(manifest, numbers.values, "section")
     if not math.isfinite(turn):
         raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     names = tuple(info.name for info in manifest.states)

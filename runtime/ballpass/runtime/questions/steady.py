@@ -301,11 +301,11 @@ def steady(
     from ballpass.runtime.contract.defaults import SENSITIVITY
 
     manifest = model.manifest
-    refuse_free_driver(manifest, "steady")
     _ = model.stepper  # refused here where a scene has none
     ends = None if over is None else parameter_range(manifest.parameters, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)
+    refuse_free_driver(manifest, numbers.values, "steady")
     turn = model.period(given)
     with kept_parts(keep, model, given, ends, turns, transient) as parts, shown("shooting", progress) as tell:
         sampled = _run(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
