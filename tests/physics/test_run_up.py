@@ -15,6 +15,7 @@ from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import Model, load
+from ballpass.runtime.contract.errors import RequestError
 
 PRESS = (Path(__file__).parents[2] / "scenes/punching_press.toml").read_text()
 SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-clockwise\n'
@@ -212,3 +213,51 @@ def test_work_of_the_punch_after_a_long_rest_is_its_force_times_the_travel_in_ev
     begin, end = (math.floor((angle - math.radians(267.0)) / math.tau) for angle in (START_ANGLE, last))
     assert (last - math.radians(237.0)) % math.tau > math.radians(30.0)  # it ends outside the window
     assert found[work].value == pytest.approx(8964.8 * travel * (end - begin), rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def with_bearing(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """The press of the paper with its bearing, no state more, run up from rest."""
+    folder = tmp_path_factory.mktemp("with_bearing")
+    text = PRESS.replace(
+        SPEED, 'table = { time = ["0 s", "0.2 s", "0.3 s"], speed = ["0 rpm", "600 rpm", "450 rpm"] }\n'
+    )
+    (folder / "press.toml").write_text(text[: text.index("[run]")] + '[run]\nduration = "0.4 s"\n')
+    model = load(generate(folder / "press.toml", folder / "model"))
+    assert not any(name.startswith("driver") for name in model.states)
+    return model
+
+
+def test_angles_and_orders_of_a_run_up_are_those_of_the_integral_of_its_table(with_bearing: Model) -> None:
+    """10 rad/s^2 times pi from rest; the mean speed is turns over time, and the last 240 degrees lie where it says."""
+    rows, rates = np.array([0.0, 0.2, 0.3]), np.array([0.0, 600.0, 450.0]) * math.pi / 30.0
+
+    def turned(time: float) -> float:
+        return angle(time, rows, rates) - START_ANGLE
+
+    whole = math.floor((turned(0.4) - math.radians(240.0)) / math.tau)
+    last = brentq(lambda t: turned(t) - math.radians(240.0) - math.tau * whole, 0.1, 0.4, xtol=1e-14)
+    mean = turned(0.4) / math.tau / 0.4
+    first = math.sqrt(2.0 * math.radians(240.0) / (rates[1] / 0.2))
+    pairs = {
+        "value:drive_torque@240deg": f"value:drive_torque@{last!r}s",
+        "amplitude:drive_torque@2x": f"amplitude:drive_torque@{2.0 * mean!r}Hz",
+        "static_deflection@240deg": f"static_deflection@{first!r}s",
+    }
+    found = with_bearing.quantities([*pairs, *pairs.values()], transient=0)
+    for name, given in pairs.items():
+        assert found[name].value == pytest.approx(found[given].value, rel=1e-9), name
+
+
+def test_derivatives_of_a_run_up_agree_with_runs_beside_it(with_bearing: Model) -> None:
+    """By speeds and times of rows: at an angle, at an order, of an extreme of the torque."""
+    asked = ["value:drive_torque@240deg", "amplitude:inner.y@1x", "amplitude:inner.y@bpfo", "max:drive_torque"]
+    moved = ["mechanism.driver.table.speed.3", "mechanism.driver.table.time.2"]
+    report = with_bearing.sensitivity(asked, moved, transient=0)
+    assert {pair.check.verdict.name for pair in report.pairs} == {"VERIFIED"}, str(report)
+
+
+def test_a_run_up_has_no_period(with_bearing: Model) -> None:
+    for ask in (with_bearing.steady, with_bearing.section):
+        with pytest.raises(RequestError, match="speed changes by its table"):
+            ask()

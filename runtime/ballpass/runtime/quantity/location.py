@@ -103,7 +103,8 @@ def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Q
         _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
     if quantity.place in _FREQUENCIES and quantity.place != "shaft":
         bearing = _bearing_of(manifest, quantity)
-        if abs(values[bearing.ring_speed]) <= TURNS * abs(timeline.shaft_speed(manifest, values)):
+        moving = {**values, **timeline.highest_rates(manifest, values)}
+        if abs(moving[bearing.ring_speed]) <= TURNS * abs(timeline.shaft_speed(manifest, moving)):
             words = bearing_words("no ball passes", [bearing])
             raise RequestError(
                 f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that {words} "

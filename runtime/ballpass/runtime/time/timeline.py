@@ -8,7 +8,7 @@ Angles are reduced modulo a turn here, so that the generated code sees small arg
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,11 +71,24 @@ def fastest(info: TurningInfo, values: Values) -> float:
 
 def mean_rates(manifest: Manifest, values: Values, begin: float, end: float) -> dict[str, float]:
     """Mean speeds over a span, by the parameters and constants that hold the first ones [rad/s]."""
+    return _rates(manifest, values, lambda turning: turning.mean_rate(begin, end))
+
+
+def highest_rates(manifest: Manifest, values: Values) -> dict[str, float]:
+    """Speeds at the moment at which the driver is fastest, in the same way."""
+    info = driver_info(manifest)
+    if info is None or not info.times:
+        return {}
+    fastest = float(values[max(zip(info.times, info.speeds, strict=True), key=lambda row: abs(values[row[1]]))[0]])
+    return _rates(manifest, values, lambda turning: float(turning.at(fastest)[1]))
+
+
+def _rates(manifest: Manifest, values: Values, rate: Callable[[Turning], float]) -> dict[str, float]:
     found = {}
     for info in manifest.turnings:
         uneven = info.times != () or info.turns != ""
         if info.kind != "load" and uneven:
-            found[info.rate] = Turning.of(info, values).mean_rate(begin, end)
+            found[info.rate] = rate(Turning.of(info, values))
     for bearing in manifest.bearings:  # of one ring against the other
         passes = [f"{bearing.path}.{name}_speed" for name in ("outer_pass", "cage", "inner_pass")]
         if passes[-1] in found and bearing.ring_speed not in found:
