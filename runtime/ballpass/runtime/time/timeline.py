@@ -495,7 +495,7 @@ def table_piece(manifest: Manifest, item: InputInfo, values: Values, t: float) -
     """
     at, argument = _knots(item, values)[0], t
     if item.turning:
-        argument = at[0] + Turning.of(info_of(manifest, item), values).within(t, at[0], item.turns)
+        argument = at[0] + past(Turning.of(info_of(manifest, item), values).at(t)[0], at[0], item.turns)
         at = np.append(at, at[0] + item.turns * TURN)
     k = int(np.searchsorted(at, argument, side="right"))
     last = len(item.times) - 1

@@ -44,7 +44,6 @@ class Turning:
     Attributes
     ----------
     begin, angle, rate, half : of each piece, shape (pieces,); the first one holds before its begin as well [s], [rad]
-    parts : into how many parts that look alike a turn falls: the balls of a cage
 
     Examples
     --------
@@ -58,19 +57,16 @@ class Turning:
     angle: np.ndarray
     rate: np.ndarray
     half: np.ndarray
-    parts: int = 1
 
     @classmethod
-    def even(cls, offset: Any, rate: Any, parts: int = 1) -> Turning:
+    def even(cls, offset: Any, rate: Any) -> Turning:
         """At one rate, from t = 0 on."""
-        return cls(begin=_START, angle=np.array([offset]), rate=np.array([rate]), half=_START, parts=parts)
+        return cls(begin=_START, angle=np.array([offset]), rate=np.array([rate]), half=_START)
 
     @classmethod
-    def by_speeds(cls, offset: Any, times: Any, speeds: Any, parts: int = 1) -> Turning:
+    def by_speeds(cls, offset: Any, times: Any, speeds: Any) -> Turning:
         """By rows of its speed, linear between them and constant outside; `offset` at t = 0."""
-        return cls._integrated(
-            offset, np.asarray(times), np.asarray(speeds), (np.zeros(0), np.zeros(0)), (1.0, 0.0), parts
-        )
+        return cls._integrated(offset, np.asarray(times), np.asarray(speeds), (np.zeros(0), np.zeros(0)), (1.0, 0.0))
 
     @classmethod
     def of(cls, info: TurningInfo, values: Values) -> Turning:
@@ -83,14 +79,12 @@ class Turning:
         """
         offset = values[info.offset] if info.offset else 0.0
         if not info.turns and not info.times:
-            return cls.even(offset, values[info.rate], info.parts)
+            return cls.even(offset, values[info.rate])
         rows, slips = knots(info.times, values), knots(info.lag_times, values)
         speeds = np.array([values[name] for name in info.speeds] or [0.0])
         lags = np.array([values[name] for name in info.lags])
         shares = (values[info.turns] if info.turns else 1.0, values[info.rolling] if info.rolling else 0.0)
-        return cls._integrated(
-            offset - (values[info.lag] if info.lag else 0.0), rows, speeds, (slips, lags), shares, info.parts
-        )
+        return cls._integrated(offset - (values[info.lag] if info.lag else 0.0), rows, speeds, (slips, lags), shares)
 
     @classmethod
     def _integrated(
@@ -100,7 +94,6 @@ class Turning:
         speeds: np.ndarray,
         lag: tuple[np.ndarray, np.ndarray],
         shares: tuple[Any, Any],
-        parts: int,
     ) -> Turning:
         """Shares of a speed, the second times the slope of a lag, integrated over time."""
         all_knots = np.concatenate([np.zeros(1), times[times.real > 0.0], lag[0][lag[0].real > 0.0]])
@@ -111,7 +104,7 @@ class Turning:
         rate, half, length = turned * speed, 0.5 * turned * slope, np.diff(begin)
         passed = np.cumsum(length * (rate[:-1] + length * half[:-1]))
         angle = offset + np.concatenate([np.zeros(1), passed])
-        return cls(begin=begin, angle=angle, rate=rate, half=half, parts=parts)
+        return cls(begin=begin, angle=angle, rate=rate, half=half)
 
     @property
     def _is_even(self) -> bool:
@@ -126,7 +119,6 @@ class Turning:
             angle=multiple * self.angle,
             rate=multiple * self.rate,
             half=multiple * self.half,
-            parts=self.parts,
         )
 
     def _piece(self, t: Any) -> Any:
@@ -146,10 +138,6 @@ class Turning:
         s = t - self.begin[k]
         angle = self.angle[k] + s * (self.rate[k] + s * self.half[k])
         return angle, self.rate[k] + 2.0 * s * self.half[k], 2.0 * self.half[k]
-
-    def within(self, t: Any, first: Any = 0.0, turns: int = 1) -> Any:
-        """Angle past `first`, less whole turns, or whole times so many; rounding before an edge counts as the edge."""
-        return past(self.at(t)[0], first, turns)
 
     def turns(self, begin: float, end: float) -> float:
         """Turns in a span, in either sense [1]."""
@@ -204,28 +192,18 @@ class Turning:
 
     def first_pass(self, angle: float, turns: int = 1) -> float | None:
         """The first time from t = 0 on at which it passes an angle, modulo so many turns [s]; None without one."""
-        period, last = turns * TURN, float(self.begin[-1])
         # from the last piece's begin on it turns at one rate
-        end = last + (2.0 * period / abs(self.rate[-1]) if self.rate[-1] else 1.0)
-        for left, right in pairwise(self._edges(0.0, end).tolist()):
-            first, later = ((e - angle) / period for e in self.held(np.array([left, right]), 0.5 * (left + right))[0])
-            whole = math.ceil(first - 1e-12) if later >= first else math.floor(first + 1e-12)
-            if min(first, later) - 1e-12 <= whole <= max(first, later):
-                for time in self._when(angle, np.array([period * whole]), left, right):
-                    return float(min(max(time, left), right))
-        return None
+        further = 1.5 * turns * TURN / abs(self.rate[-1]) if self.rate[-1] else 1.0
+        return next(iter(self.passes(angle, 0.0, float(self.begin[-1] + further), turns).tolist()), None)
 
     def last_pass(self, angle: float, end: float, turns: int = 1) -> float | None:
-        """The last time from t = 0 to `end` at which it passes an angle, modulo so many turns [s]; None without one."""
-        period = turns * TURN
-        for left, right in reversed([*pairwise(self._edges(0.0, end).tolist())]):
-            first, last = ((e - angle) / period for e in self.held(np.array([left, right]), 0.5 * (left + right))[0])
-            # an angle at the very end included; 1e-9 of a turn is rounding
-            whole = math.floor(last + 1e-9) if last >= first else math.ceil(last - 1e-9)
-            if min(first, last) - 1e-9 <= whole <= max(first, last) + 1e-9:
-                for time in self._when(angle, np.array([period * whole]), left, right):
-                    return float(min(max(time, left), right))
-        return None
+        """The last time from t = 0 to `end` at which it does [s]; None without one."""
+        back = 1.5 * turns * TURN / (self.fastest or 1.0)
+        while not len(found := self.passes(angle, max(end - back, 0.0), end, turns)):
+            if back >= end:
+                return None
+            back *= 2.0
+        return float(found[-1])
 
     def _when(self, angle: float, whole: np.ndarray, left: float, right: float) -> np.ndarray:
         """Times at which it is at an angle plus whole turns, in a part of a piece where it grows or falls [s]."""
