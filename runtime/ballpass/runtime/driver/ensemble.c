@@ -89,6 +89,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES], *row = job->reductions + m * BP_REDUCTION;
         bp_channels(&n, at->t, x, b->balls, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
+        for (int k = 0; k < BP_LOOKED_AT - BP_NX && b->sided; k++) b->side[0][k * BP_L + lane] = bp_side(balls, k);
         if (!(row[BP_DURATION] > 0.0)) memcpy(row + BP_SHIFT, value, BP_LOOKED_AT * sizeof *value);
         put(b->shift, lane, row + BP_SHIFT, BP_CHANNELS);
         if (b->passes) put_powers(b, lane, balls);

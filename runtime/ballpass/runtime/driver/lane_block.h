@@ -53,12 +53,15 @@ typedef struct {
     double dense[BP_DENSE_ROWS][BP_NX * BP_L] BP_ALIGNED;
     double sampled[BP_POINTS][BP_CHANNELS * BP_L] BP_ALIGNED;
     double first[BP_POINTS][(BP_NB > 0 ? BP_NB : 1) * BP_L] BP_ALIGNED; /* powers of the balls' loads at the quarters, where wanted */
+    /* sides of the balls' quantities at the quarters (bp_side), and whether they change in the step */
+    double side[BP_POINTS][(BP_NB > 0 ? BP_LOOKED_AT - BP_NX : 1) * BP_L] BP_ALIGNED, cut[BP_LOOKED_AT * BP_L] BP_ALIGNED;
     double best[BP_EXTREMES][BP_CHANNELS * BP_L] BP_ALIGNED;
     double shift[BP_CHANNELS * BP_L] BP_ALIGNED, moment[BP_MOMENTS][BP_CHANNELS * BP_L] BP_ALIGNED;
     long who[BP_L];
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
     int method;         /* which this pass advances */
     int balls, passes;  /* whether channels of the balls, and what fatigue needs, are reduced */
+    int sided;          /* whether moments of the former are */
     int guarded;        /* whether of these only such as guard a run */
     const double *wanted; /* a row of reductions: what is wanted, of all members the same */
     int extremes, moments[BP_MOMENTS];                           /* how many channels are, */

@@ -179,21 +179,29 @@ static inline __attribute__((flatten)) void bp_lane_deflections(const bp_lane_nu
 }
 
 /* Channels of the balls (see reductions.h) in lanes, at the times `time`: of each bearing quantities of the most loaded ball, and,
-   where `passes`, the powers of all balls' loads that sectors add up. */
+   where `passes`, the powers of all balls' loads that sectors add up; where they are wanted, the sides of the balls (bp_side). */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const double *restrict time, const double *restrict x,
-                                         int passes, double *restrict value, double *restrict first)
+                                         int passes, double *restrict value, double *restrict first, double *restrict side,
+                                         int sided)
 {
     double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
     bp_member_cage_lanes(time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
 #define BP_CHANNEL(b)                                                                                                            \
     {                                                                                                                            \
+        double *sides = side + BP_BALL_CHANNELS * (b) * BP_L;                                                                    \
         double *to = value + BP_BALL_CHANNELS * (b) * BP_L;                                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
             double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED, load[BP_L] BP_ALIGNED;    \
             double *own = first + (BP_##b##_FIRST_BALL + j) * BP_L;                                                              \
             bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                  \
             bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                            \
+            for (int k = 0; k < BP_BALL_CHANNELS && sided; k++)                                                                  \
+                BP_EACH_LANE {                                                                                                   \
+                    const int i = k * BP_L + lane, contact = k != BP_DEFLECTION && rows[BP_DEFLECTION * BP_L + lane] > 0.0;      \
+                    const double at = 4.0 * j + 2.0 * contact + (k != BP_DEFLECTION && rows[BP_DAMPING * BP_L + lane] == 0.0);   \
+                    sides[i] = j == 0 || rows[i] > to[i] ? at : sides[i];                                                        \
+                }                                                                                                                \
             _Pragma("omp simd")                                                                                                  \
             for (int i = 0; i < BP_BALL_CHANNELS * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];               \
             if (!passes) continue;                                                                                               \

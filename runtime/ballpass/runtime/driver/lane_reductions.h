@@ -54,6 +54,8 @@ static void list_wanted(bp_lane_block *b, const double *reduction)
     b->passes = bp_wanted(reduction, BP_LOOKED_AT) > 0.0;
     /* balls are evaluated within the step, or at the end of a part of it */
     const int all_states = b->balls && (!b->guarded || bp_parts(bp_methods[b->method].dense_degree) > 1);
+    b->sided = 0;
+    for (int k = BP_NX; k < BP_LOOKED_AT; k++) b->sided |= bp_wants_moments(reduction, k);
     for (int k = 0; k < BP_LOOKED_AT; k++) {
         double extreme = 0.0, any = (double)all_states;
         for (int e = 0; e < BP_EXTREMES; e++) extreme += wanted[e * BP_CHANNELS + k];
@@ -111,6 +113,7 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
 {
     const bp_method *method = &bp_methods[b->method];
     const double(*dense)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->dense;
+    memset(b->cut, 0, sizeof b->cut);
     for (int q = 1; q < BP_POINTS; q++) {
         const double theta = part + span * ((double)q / (BP_POINTS - 1));
         double *restrict y = b->sampled[q];
@@ -125,7 +128,8 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         double time[BP_L] BP_ALIGNED;
         BP_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
         if (b->guarded) bp_lane_deflections(&b->numbers, time, y, y + BP_NX * BP_L);
-        else bp_lane_ball_channels(&b->numbers, time, y, b->passes, y + BP_NX * BP_L, b->first[q]);
+        else bp_lane_ball_channels(&b->numbers, time, y, b->passes, y + BP_NX * BP_L, b->first[q], b->side[q], b->sided);
+        for (int i = 0; i < (BP_LOOKED_AT - BP_NX) * BP_L && b->sided; i++) b->cut[BP_NX * BP_L + i] += b->side[q][i] != b->side[q - 1][i];
     }
     /* deflections that only guard against results that mean nothing are evaluated at the ends, and between where that may be a new extreme */
     for (int k = BP_NX + BP_DEFLECTION; k < BP_LOOKED_AT && b->guarded; k += BP_BALL_CHANNELS)
@@ -161,18 +165,31 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
             bp_quartic q = bp_quartic_through(v0, v1, v2, v3, v4);                                                                     \
             q.c0 -= shift;                                                                                                             \
             const double mean = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);                                            \
-            b->moment[m][row + lane] += add[lane] != 0.0 ? span * b->h[lane] * mean : 0.0;                                             \
+            const double whole = b->cut[row + lane] == 0.0 ? add[lane] : 0.0;                                                          \
+            b->moment[m][row + lane] += whole != 0.0 ? span * b->h[lane] * mean : 0.0;                                                 \
         }                                                                                                                              \
     }
     BP_EACH_MOMENT(BP_OF_DEGREE)
 #undef BP_OF_DEGREE
+    for (int k = BP_NX; k < BP_LOOKED_AT && b->sided; k++)
+        for (int lane = 0; lane < BP_L && bp_wants_moments(b->wanted, k); lane++) {
+            b->cut[k * BP_L + lane] *= add[lane];
+            any[lane] += b->cut[k * BP_L + lane];
+            of_balls[lane] += b->cut[k * BP_L + lane];
+        }
     for (int lane = 0; lane < BP_L && bp_any_lane(any); lane++) {
         if (any[lane] == 0.0) continue;
         double *reduction = job->reductions + b->who[lane] * BP_REDUCTION;
         bp_lane_source source;
         lane_source(job, b, lane, part, span, of_balls[lane] != 0.0, &source);
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
-        const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], &source.n, lane_state, &source, balls};
+        const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], 1.0, &source.n, lane_state, &source, balls};
+        for (int k = BP_NX; k < BP_LOOKED_AT && b->sided; k++) {
+            if (b->cut[k * BP_L + lane] == 0.0 || !bp_wants_moments(b->wanted, k)) continue;
+            double mean[BP_MOMENTS];
+            bp_moments_between(&step, k - BP_NX, b->shift[k * BP_L + lane], mean);
+            for (int m = 0; m < BP_MOMENTS; m++) b->moment[m][k * BP_L + lane] += span * b->h[lane] * mean[m];
+        }
         for (int i = 0; i < b->extremes; i++) {
             for (int e = 0; e < BP_EXTREMES; e++) {
                 const int k = b->extreme[i];
@@ -188,6 +205,11 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         BP_EACH_LANE {
             const int i = k * BP_L + lane;
             b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[BP_POINTS - 1][i] : b->sampled[0][i];
+        }
+    for (int k = 0; k < BP_LOOKED_AT - BP_NX && b->sided; k++)
+        BP_EACH_LANE {
+            const int i = k * BP_L + lane;
+            b->side[0][i] = add[lane] != 0.0 ? b->side[BP_POINTS - 1][i] : b->side[0][i];
         }
 }
 

@@ -71,6 +71,17 @@ static double state_of_step(const void *source, double theta, double *x)
     return step->t + place * step->h;
 }
 
+#ifdef BALLPASS_LOCATED
+/* Lead of a part of a step. */
+static double lead_between(const bp_run *run, double from, double to)
+{
+    const double first = bp_pace(run->lead, place_of(run, from)), last = bp_pace(run->lead, place_of(run, to));
+    return is_paced(run) ? 2.0 * first / (first + last) : 1.0;
+}
+#else
+#define lead_between(run, from, to) 1.0
+#endif
+
 static void reduce_start(bp_run *run, double start)
 {
     run->reduction = run->options->reduction;
@@ -107,7 +118,7 @@ static int reduce_step(bp_run *run, double start, double t, double h, int cut, i
         if (run->reduces_balls && run->behind_kink && part == 0) reduce_beside(run, &step, 0);
         if (run->reduces_balls && cut && part == parts - 1) reduce_beside(run, &step, BP_POINTS - 1);
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
-        const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};
+        const bp_within within = {start + t + step.from * h, step.span * h, lead_between(run, step.from, step.from + step.span), &run->numbers, state_of_step, &step, balls};
         bp_reduce(run->reduction, run->reduces_passes, (const double(*)[BP_CHANNELS])run->sampled, &within);
         memcpy(run->balls[0], run->balls[BP_POINTS - 1], sizeof run->balls[0]);
         memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);

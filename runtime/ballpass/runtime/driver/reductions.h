@@ -5,7 +5,9 @@
    whose dense output is of a degree above four, as two steps of half the size.
 
    Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
-   all methods but these; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
+   all methods but these; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.  The most loaded
+   ball has kinks where two balls change rank, where it comes into contact or leaves it, and where its damping ends that is one-sided.  A step
+   with such a cut is integrated piece by piece between its cuts, by Gauss's rule, and one near a contact over its own pace (sqrt_time.h).
 
    Extremes: that polynomial is searched for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
    evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all other
@@ -30,6 +32,7 @@
 #include "model.h"
 #include "powers.h"
 #include "reduction_tables.h"
+#include "sqrt_time.h"
 
 enum { BP_POINTS = 5 };
 
@@ -163,9 +166,9 @@ static inline int bp_most_loaded(const double *of, int balls)
     return best + 1;
 }
 
-/* A step, as searches see it. */
+/* A step, as searches see it; `lead` of its pace (sqrt_time.h). */
 typedef struct {
-    double time, h;
+    double time, h, lead;
     const bp_numbers *n;
     /* state at a part of the step, and its time in the segment */
     double (*state)(const void *source, double theta, double *x);
@@ -173,14 +176,23 @@ typedef struct {
     const double (*balls)[BP_BALL_QUANTITIES]; /* of the balls, at the quarters */
 } bp_within;
 
+/* Quantities of all balls within a step: of many a step where one is cut, and so not compiled for size with those that call it. */
+__attribute__((noinline)) static void bp_balls_within(const bp_within *step, double theta, double *restrict q)
+{
+    double x[BP_NX];
+    bp_ball_quantities(step->n, step->state(step->source, theta, x), x, q);
+}
+
 /* One channel within a step; `ball`, counted from 1, is the one evaluated, 0: the most loaded ball, which is set then. */
 static inline double bp_channel(const bp_within *step, double theta, int channel, int *ball)
 {
     double x[BP_NX], q[BP_BALL_QUANTITIES];
-    const double t = step->state(step->source, theta, x);
-    if (BP_NB == 0 || channel < BP_NX) return x[channel];
+    if (BP_NB == 0 || channel < BP_NX) {
+        step->state(step->source, theta, x);
+        return x[channel];
+    }
     int balls;
-    bp_ball_quantities(step->n, t, x, q);
+    bp_balls_within(step, theta, q);
     const double *of = bp_ball_row(q, channel - BP_NX, &balls);
     if (*ball == 0) *ball = bp_most_loaded(of, balls);
     return of[*ball - 1];
@@ -402,16 +414,23 @@ static inline int bp_dips(const double *start, const double *end, int balls, dou
     return start[first] + fall * ahead / (ahead + behind) - 0.25 * (fabs(fall) + fabs(rise)) < best;
 }
 
+/* Rows of a channel of the balls at the quarters of a step, and of their deflections. */
+static inline int bp_rows_at(const bp_within *step, int row, const double *of[BP_POINTS], const double *gap[BP_POINTS])
+{
+    int balls = 0;
+    for (int i = 0; i < BP_POINTS; i++) {
+        of[i] = bp_ball_row(step->balls[i], row, &balls);
+        gap[i] = of[i] + (BP_DEFLECTION - row % BP_BALL_CHANNELS) * balls;
+    }
+    return balls;
+}
+
 /* Extreme of a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
 static inline void bp_ball_extreme(bp_search search, const double *u)
 {
     const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS;
     const double *of[BP_POINTS], *gap[BP_POINTS];
-    int balls;
-    for (int i = 0; i < BP_POINTS; i++) {
-        of[i] = bp_ball_row(search.step->balls[i], row, &balls);
-        gap[i] = of[i] + (BP_DEFLECTION - kind) * balls;
-    }
+    const int balls = bp_rows_at(search.step, row, of, gap);
     /* no ball carries more than the most loaded one */
     const int jumps = bp_jumps[kind];
     if (search.sign < 0.0) {
@@ -468,6 +487,159 @@ BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const dou
     else bp_ball_extreme(search, u);
 }
 
+enum { BP_CUTS = 64, BP_HALVINGS = 20 }; /* of a step at most, and to find one */
+
+/* Cuts nearer to each other than this part of a step are one, and ranks within this part of their change are equal: what that costs is of its
+   square. */
+static const double BP_SAME_CUT = 1e-4;
+
+/* Nodes of Gauss's rule between two cuts, in parts, and their weights: of the degree of Boole's rule. */
+enum { BP_NODES = 3 };
+static const double bp_node[BP_NODES] = {0.11270166537925831, 0.5, 0.88729833462074169}, bp_node_weight[BP_NODES] = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
+
+/* Places of a step, as parts of it, between which the largest values of the balls' channels are smooth. */
+typedef struct {
+    int count;
+    double at[BP_CUTS + 2];
+} bp_cuts;
+
+static inline double bp_quartic_at(bp_quartic q, double s) { return q.c0 + s * (q.c1 + s * (q.c2 + s * (q.c3 + s * q.c4))); }
+
+/* Where a polynomial passes zero between the places low and high, whose signs differ; low where they do not. */
+static inline double bp_root(bp_quartic q, double low, double high)
+{
+    double a = 4.0 * low - 2.0, b = 4.0 * high - 2.0;
+    const int positive = bp_quartic_at(q, a) > 0.0;
+    if (positive == (bp_quartic_at(q, b) > 0.0)) return low;
+    for (int i = 0; i < BP_HALVINGS; i++) {
+        const double middle = 0.5 * (a + b);
+        if ((bp_quartic_at(q, middle) > 0.0) == positive) a = middle;
+        else b = middle;
+    }
+    return 0.125 * (a + b) + 0.5;
+}
+
+/* A cut more, in order. */
+static inline void bp_cut(bp_cuts *cuts, double at)
+{
+    int k = cuts->count;
+    for (int i = 0; i < k; i++)
+        if (fabs(cuts->at[i] - at) < BP_SAME_CUT) return;
+    if (k == BP_CUTS) return;
+    for (; k > 0 && cuts->at[k - 1] > at; k--) cuts->at[k] = cuts->at[k - 1];
+    cuts->at[k] = at;
+    cuts->count++;
+}
+
+/* One ball's row `of` at the quarters, as the polynomial through them. */
+static inline bp_quartic bp_quartic_of(const double *const of[BP_POINTS], int j)
+{
+    return bp_quartic_through(of[0][j], of[1][j], of[2][j], of[3][j], of[4][j]);
+}
+
+/* Cuts between the places low and high, from a row of the balls there: where another ball becomes the most loaded one, which may be a third
+   one between those at both ends.  The polynomials give the first guess. */
+static void bp_rank_cuts(bp_cuts *cuts, const bp_within *step, int row, const double *const of[BP_POINTS], double low, const double *start,
+                         double high, const double *end)
+{
+    double q[BP_BALL_QUANTITIES];
+    int balls;
+    const double *const there = bp_ball_row(q, row, &balls);
+    const int a = bp_most_loaded(start, balls) - 1, b = bp_most_loaded(end, balls) - 1;
+    if (a == b || high - low < BP_SAME_CUT) return;
+    const bp_quartic one = bp_quartic_of(of, a), two = bp_quartic_of(of, b);
+    double left = low, right = high, ahead = start[a] - start[b], behind = end[a] - end[b];
+    double at = bp_root((bp_quartic){one.c0 - two.c0, one.c1 - two.c1, one.c2 - two.c2, one.c3 - two.c3, one.c4 - two.c4}, low, high);
+    const double close = BP_SAME_CUT * (ahead - behind);
+    for (int i = 0; i < BP_REFINEMENTS; i++) {
+        if (!(at > left && at < right)) at = 0.5 * (left + right);
+        bp_balls_within(step, at, q);
+        const int most = bp_most_loaded(there, balls) - 1;
+        if (most != a && most != b) {
+            bp_rank_cuts(cuts, step, row, of, low, start, at, there);
+            bp_rank_cuts(cuts, step, row, of, at, there, high, end);
+            return;
+        }
+        const double apart = there[a] - there[b];
+        if (fabs(apart) <= close) break;
+        if (apart > 0.0) left = at, ahead = apart;
+        else right = at, behind = apart;
+        at = i % 2 ? 0.5 * (left + right) : left + (right - left) * ahead / (ahead - behind);
+    }
+    bp_cut(cuts, at);
+}
+
+/* Whether moments of a channel are wanted. */
+static inline int bp_wants_moments(const double *reduction, int channel)
+{
+    double wanted = 0.0;
+    for (int m = 0; m < BP_MOMENTS; m++) wanted += reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + channel];
+    return wanted != 0.0;
+}
+
+/* Number of the most loaded ball of a channel of the balls, times 4, and on which side it is of what makes corners: contact, and the end of the
+   damping of a law that damps one way.  Deflections have none.  lane_model.h has the same in lanes. */
+static inline double bp_side(const double *q, int row)
+{
+    int balls;
+    const double *of = bp_ball_row(q, row, &balls);
+    const int j = bp_most_loaded(of, balls) - 1, kind = row % BP_BALL_CHANNELS;
+    const double *own = of + j - kind * balls;
+    return 4.0 * j + (kind == BP_DEFLECTION ? 0.0 : 2.0 * (own[BP_DEFLECTION * balls] > 0.0) + (own[BP_DAMPING * balls] == 0.0));
+}
+
+/* Whether a step is cut for a channel of the balls: its side changes between the quarters, or the step's pace is uneven. */
+static inline int bp_is_cut(const bp_within *step, int row)
+{
+    const double side = bp_side(step->balls[0], row);
+    int cut = step->lead != 1.0;
+    for (int i = 1; i < BP_POINTS && !cut; i++) cut = bp_side(step->balls[i], row) != side;
+    return cut;
+}
+
+/* Cuts of a step for a channel of the balls: where another ball becomes the most loaded one, where such a ball comes into contact or leaves it,
+   and where its approach turns under a law that damps one way. */
+static void bp_find_cuts(bp_cuts *cuts, const bp_within *step, int row)
+{
+    const double *of[BP_POINTS], *gap[BP_POINTS];
+    const int balls = bp_rows_at(step, row, of, gap);
+    cuts->count = 0;
+    for (int i = 0; i + 1 < BP_POINTS; i++) {
+        const double low = 0.25 * i, high = 0.25 * (i + 1);
+        const int first = bp_most_loaded(of[i], balls) - 1, last = bp_most_loaded(of[i + 1], balls) - 1;
+        bp_rank_cuts(cuts, step, row, of, low, of[i], high, of[i + 1]);
+        for (int j = first; row % BP_BALL_CHANNELS != BP_DEFLECTION; j = last) {
+            const int damping = j + (BP_DAMPING - BP_DEFLECTION) * balls, contact = (gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0);
+            if (contact || (gap[i][damping] == 0.0) != (gap[i + 1][damping] == 0.0)) {
+                const bp_quartic q = bp_quartic_of(gap, j), slope = {q.c1, 2.0 * q.c2, 3.0 * q.c3, 4.0 * q.c4, 0.0};
+                const double at = bp_root(contact ? q : slope, low, high);
+                if (at != low) bp_cut(cuts, at);
+            }
+            if (j == last) break;
+        }
+    }
+}
+
+/* Means over a step of powers of a channel of the balls less its shift, from Gauss's nodes between its cuts, over the pace of the step. */
+BP_SELDOM void bp_moments_between(const bp_within *step, int row, double shift, double moment[BP_MOMENTS])
+{
+    bp_cuts cuts;
+    bp_find_cuts(&cuts, step, row);
+    cuts.at[cuts.count] = 1.0;
+    for (int m = 0; m < BP_MOMENTS; m++) moment[m] = 0.0;
+    for (int piece = 0; piece <= cuts.count; piece++) {
+        const double from = bp_theta(step->lead, piece ? cuts.at[piece - 1] : 0.0), to = bp_theta(step->lead, cuts.at[piece]);
+        for (int g = 0; g < BP_NODES; g++) {
+            const double s = from + (to - from) * bp_node[g], weight = bp_node_weight[g] * (to - from) * bp_pace(step->lead, s);
+            int ball = 0;
+            const double apart = bp_channel(step, bp_passed(step->lead, s), BP_NX + row, &ball) - shift;
+#define BP_OF_DEGREE(m, degree) moment[m] += weight * bp_whole_power(apart, degree);
+            BP_EACH_MOMENT(BP_OF_DEGREE)
+#undef BP_OF_DEGREE
+        }
+    }
+}
+
 /* Add an accepted step whose channels at the quarters are v; `passes`: whether what fatigue needs is wanted. */
 static inline void bp_reduce(double *reduction, int passes, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
 {
@@ -487,6 +659,12 @@ static inline void bp_reduce(double *reduction, int passes, const double v[BP_PO
 #define BP_OF_DEGREE(m, degree) moment[m][k] = bp_moment(degree, v0, v1, v2, v3, v4, q, shift, k < BP_NX);
         BP_EACH_MOMENT(BP_OF_DEGREE)
 #undef BP_OF_DEGREE
+    }
+    for (int k = BP_NX; k < BP_LOOKED_AT; k++) {
+        if (!bp_wants_moments(reduction, k) || !bp_is_cut(step, k - BP_NX)) continue;
+        double between[BP_MOMENTS];
+        bp_moments_between(step, k - BP_NX, reduction[BP_SHIFT + k], between);
+        for (int m = 0; m < BP_MOMENTS; m++) moment[m][k] = between[m];
     }
     for (int k = 0; k < BP_LOOKED_AT; k++) {
         for (int m = 0; m < BP_MOMENTS; m++)

@@ -31,7 +31,7 @@ HEAD = ("from", "duration")
 EXTREMES = {"max": 1, "min": -1}
 
 #: Integrals of powers of the channel less its shift, by their exponent.  A further one is a line here: exact for
-#: states, whose dense output is a polynomial, by Boole's rule for the balls.
+#: states, whose dense output is a polynomial; for the balls by Boole's rule in steps without a cut.
 MOMENTS = {"integral": 1, "square": 2}
 
 #: The channel that shows whether a bearing can be so.
@@ -184,6 +184,7 @@ def reduction_tables() -> str:
 
 enum {{
     BP_BALL_CHANNELS = {len(BALL_CHANNELS)},
+    BP_DAMPING = {BALL_CHANNELS.index("ball.damping_force")},
     BP_DEFLECTION = {BALL_CHANNELS.index("ball.deflection")}, /* among them */
     BP_SECTORS = {SECTORS},  /* of a raceway */
     BP_EXTREMES = {len(EXTREMES)},
