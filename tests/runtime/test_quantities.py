@@ -378,6 +378,21 @@ def test_time_of_the_largest_load_of_an_unbalance_moves_with_its_angle_and_with_
     assert {pair.check.verdict for pair in report.pairs} == {Verdict.VERIFIED}
 
 
+def test_of_equal_peaks_of_a_periodic_torque_the_first_is_taken(make_model: Callable[..., Model]) -> None:
+    """Of a linkage that turns evenly every turn has the same peak; rounding decided in which it was."""
+    model = make_model("four_bar")
+    name, extremes = "mechanism.driver.speed", ["peak_time:drive_torque", "min_time:drive_torque"]
+    speeds = model.parameters[name] * (1.0 + 1e-3 * np.arange(-4, 5))
+    found = model.simulate_many({name: speeds}, extremes, cycles=6, transient=1)
+    report = model.sensitivity(extremes, name, cycles=6, transient=1)
+    assert {pair.check.verdict for pair in report.pairs} == {Verdict.VERIFIED}
+    for pair, extreme in zip(report.pairs, extremes, strict=True):
+        turns = speeds * found[extreme] / (2.0 * math.pi)
+        assert np.all(turns < 2.01), extreme
+        slope = (found[extreme][5] - found[extreme][3]) / (speeds[5] - speeds[3])
+        assert pair.derivative == pytest.approx(slope, rel=1e-4), extreme
+
+
 def test_lives_of_two_bearings_have_the_same_bits_in_runs_and_members(make_model: Callable[..., Model]) -> None:
     model = make_model("rotor_two_bearings")
     names = ["pulley.life", "free_end.life"]

@@ -21,7 +21,8 @@
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
-   extreme beside the jump.  A quarter of a step with a change of rank or contact is searched by halves, to 1e-6 of the extreme.
+   extreme beside the jump.  A quarter of a step with a change of rank or contact is searched by halves, to 1e-6 of the extreme.  Of extremes
+   that differ by less than the tolerance of the run the first is taken.
 
    A reduction is a row of BP_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef BALLPASS_REDUCTIONS_H
@@ -469,6 +470,7 @@ BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const dou
     const double sign = bp_sign[extreme];
     const bp_search search = {reduction + BP_EXTREME + 3 * extreme * BP_CHANNELS + channel, sign, step, channel, 0};
     double *best = search.best, u[BP_POINTS];
+    const double known = best[0], time = best[BP_CHANNELS], ball = best[2 * BP_CHANNELS];
     int top = 0, balls;
     for (int i = 0; i < BP_POINTS; i++) {
         u[i] = sign * v[i * stride];
@@ -485,6 +487,13 @@ BP_SELDOM void bp_extreme(double *reduction, int extreme, int channel, const dou
     }
     if (channel < BP_NX) bp_tops(&search, u);
     else bp_ball_extreme(search, u);
+    /* of equal extremes the first; one at the end of the step before goes on here */
+    const int apart = reduction[BP_DURATION] > 0.0 && time < step->time - 1e-3 * step->h;
+    if (apart && fabs(best[0] - known) <= reduction[BP_EQUAL] * fabs(known)) {
+        best[0] = known;
+        best[BP_CHANNELS] = time;
+        best[2 * BP_CHANNELS] = ball;
+    }
 }
 
 enum { BP_CUTS = 64, BP_HALVINGS = 20 }; /* of a step at most, and to find one */

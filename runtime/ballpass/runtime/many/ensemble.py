@@ -263,7 +263,7 @@ def simulate_many(
         lanes=in_lanes,
         reducing=bool(reduced),
         end=members.initial.copy(),
-        rows=reduction_rows(manifest).empty(len(members), span.starts, reduced),
+        rows=reduction_rows(manifest).empty(len(members), span.starts, reduced, tolerance),
         results={
             member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
             for member, message in members.refused.items()

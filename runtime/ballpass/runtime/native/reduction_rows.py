@@ -24,8 +24,11 @@ from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
 
 Array: TypeAlias = NDArray[np.float64]
 
-#: Head of a row.
-HEAD = ("from", "duration")
+#: Head of a row; `equal`: extremes that differ by less, relative to themselves, are equal, and the first is taken [1].
+HEAD = ("from", "duration", "equal")
+
+#: Least of it: outputs of equal states differ by less [1].
+EQUAL = 1e-10
 
 #: Extremes of a channel, by their sign; each is a value, its time and its ball.
 EXTREMES = {"max": 1, "min": -1}
@@ -123,16 +126,17 @@ class ReductionRows:
         """All extremes and moments of these channels, for `empty`."""
         return [(name, channel) for channel in channels for name in (*EXTREMES, *MOMENTS)]
 
-    def empty(self, count: int, start: ArrayLike, wanted: Collection[tuple[str, str]]) -> np.ndarray:
+    def empty(self, count: int, start: ArrayLike, wanted: Collection[tuple[str, str]], rtol: float = 0.0) -> np.ndarray:
         """Rows of reductions that count from `start` on [s], shape (count, size).
 
         Parameters
         ----------
         wanted : extremes and moments, each of a channel.  The highest deflection of the balls is always among them: it
             shows whether a bearing can be so.
+        rtol : relative tolerance of the runs [1]
         """
         rows = np.zeros((count, self.size))
-        rows[:, HEAD.index("from")] = start
+        rows[:, HEAD.index("from")], rows[:, HEAD.index("equal")] = start, max(rtol, EQUAL)
         for channel in self.channels:
             if channel.endswith(DEFLECTION):
                 rows[:, self.column("max_wanted", channel)] = GUARD

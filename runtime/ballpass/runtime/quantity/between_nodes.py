@@ -1,6 +1,7 @@
 """Extremes of channels along a run, found between its nodes.
 
-In: a track, channels along it, and the times of the extremes in the driver's reductions.  Out: an `Extreme` for each.
+In: a track, channels along it, and the times of the extremes in the driver's reductions.  Out: an `Extreme` for each,
+of equal ones the first.
 
 Around the best nodes, and around the moment of the reductions, the run is evaluated again on finer and finer grids,
 until a parabola through three points is exact to rounding.  Where two balls carry the same load, the largest ball force
@@ -30,8 +31,9 @@ SMOOTH = 1e-2
 #: Extremes nearer to each other than this share of the run are one.
 APART = 1e-9
 
-#: Most nodes to refine around: the best that no neighbour exceeds.
-CANDIDATES = 5
+#: Most nodes to refine around: the best that no neighbour exceeds.  Then the first of those that are lower by less than
+#: this share of the range of values, which an equal extreme between nodes may be.
+CANDIDATES, FIRST, LOWER = 5, 64, 1e-2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +97,7 @@ def find_extremes(
     track: Track,
     signals: Mapping[str, Signal],
     look: Callable[[Nodes], Mapping[str, Signal]],
+    equal: float,
 ) -> list[list[Extreme]]:
     """Largest or smallest values over the nodes of a track and between them, and the next ones elsewhere.
 
@@ -102,6 +105,7 @@ def find_extremes(
     ----------
     signals : the channels along the track
     look : function that gives the channels of the same run along other nodes
+    equal : extremes that differ by less are equal, relative to the largest size of the channel [1]
     """
     edges = track.edges
     brackets = [[] if item.exact else _brackets(item, track, signals[item.channel].value) for item in wanted]
@@ -117,7 +121,12 @@ def find_extremes(
             best = _top(_height(bracket))
             bracket.low, bracket.high = bracket.times[max(best - 1, 0)], bracket.times[min(best + 1, GRID - 1)]
     return [
-        _ranked(item, [_extreme(bracket, edges) for bracket in some], edges)
+        _ranked(
+            item,
+            [_extreme(bracket, edges) for bracket in some],
+            edges,
+            equal * float(np.max(np.abs(signals[item.channel].value))),
+        )
         if some
         else _seen(item, track, signals[item.channel].value)
         for item, some in zip(wanted, brackets, strict=True)
@@ -155,7 +164,7 @@ def _tops(nodes: Nodes, height: Array) -> NDArray[np.int_]:
     same = np.diff(nodes.segment) == 0
     before = np.concatenate([[-np.inf], np.where(same, height[:-1], -np.inf)])
     behind = np.concatenate([np.where(same, height[1:], -np.inf), [-np.inf]])
-    tops = np.flatnonzero((height >= before) & (height >= behind))
+    tops = np.flatnonzero((height > before) & (height >= behind))
     return tops[np.argsort(-height[tops], kind="stable")]
 
 
@@ -164,8 +173,9 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
     nodes, edges = track.nodes, track.edges
     height = wanted.sign * (values[:, wanted.ball] if wanted.ball is not None else np.max(values, axis=1))
     same, ranked = np.diff(nodes.segment) == 0, _tops(nodes, height)
+    near = np.sort(ranked[np.max(height) - height[ranked] <= LOWER * np.ptp(height)])[:FIRST]
     found = []
-    for k in [_top(height), *ranked[:CANDIDATES].tolist()]:
+    for k in dict.fromkeys([_top(height), *ranked[:CANDIDATES].tolist(), *near.tolist()]):
         low, high = (k - 1 if k and same[k - 1] else k), (k + 1 if k < len(same) and same[k] else k)
         found.append((int(nodes.segment[k]), float(nodes.t[low]), float(nodes.t[high])))
     if wanted.seen is not None:
@@ -233,8 +243,9 @@ def _crossing(
     return replace(crossing, column=a, other=b, rate=rate_a, other_rate=rate_b)
 
 
-def _ranked(wanted: Wanted, found: list[Extreme], edges: Edges) -> list[Extreme]:
-    """The best of several, and those elsewhere."""
+def _ranked(wanted: Wanted, found: list[Extreme], edges: Edges, equal: float) -> list[Extreme]:
+    """The best of several, of equal ones the first, and the next ones elsewhere."""
     found.sort(key=lambda item: -wanted.sign * item.value)
-    first = found[0]
-    return [first, *(item for item in found[1:] if abs(item.time - first.time) > APART * edges.length)]
+    first = min((item for item in found if abs(item.value - found[0].value) <= equal), key=lambda item: item.time)
+    others = (item for item in found[: CANDIDATES + 1] if abs(item.time - first.time) > APART * edges.length)
+    return [first, *others]

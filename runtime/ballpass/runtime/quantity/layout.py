@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.reduction_rows import EQUAL, reduction_rows
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
 from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks, rank_differences
@@ -390,7 +390,8 @@ class NodeLayer:
 
         each = [wanted(item, kind) for item, kind in asked]
         distinct = list(dict.fromkeys(each))
-        found = dict(zip(distinct, find_extremes(distinct, track, layout.signals, look), strict=True))
+        equal = max(run.rtol, EQUAL)
+        found = dict(zip(distinct, find_extremes(distinct, track, layout.signals, look, equal), strict=True))
         extremes = {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
         if layout.passages.edges:
             extremes = {key: [_beside(one, layout) for one in some] for key, some in extremes.items()}

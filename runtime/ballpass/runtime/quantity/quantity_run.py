@@ -290,7 +290,7 @@ class QuantityRun:
         needed = {row for item in self._reduced for row in needed_rows(item)}
         if self._motion:
             needed |= {(name, state) for name in EXTREMES for state in self.model.states}
-        return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])
+        return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed, run.rtol)[0])
 
     def _moving_edges(
         self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float

@@ -62,7 +62,7 @@ class ReducedRun:
         """Those since the last time that they were taken."""
         found = self.reductions()
         layout = reduction_rows(self.run.model.manifest)
-        self.row[:] = layout.empty(1, self.going.time, layout.all_of(self.channels))[0]
+        self.row[:] = layout.empty(1, self.going.time, layout.all_of(self.channels), self.run.rtol)[0]
         return found
 
     def reductions(self) -> Reductions:
@@ -90,6 +90,6 @@ def start_reducing(run: Run, channels: Collection[str]) -> ReducedRun:
         The run ends within its transient.
     """
     layout = reduction_rows(run.model.manifest)
-    row = layout.empty(1, run.check_steady().start, layout.all_of(channels))[0]
+    row = layout.empty(1, run.check_steady().start, layout.all_of(channels), run.rtol)[0]
     sink = ReductionRow(row=row, before=layout.empty(1, 0.0, ())[0])
     return ReducedRun(going=start_run(run, [sink]), row=row, channels=tuple(channels))

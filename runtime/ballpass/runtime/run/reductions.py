@@ -234,8 +234,8 @@ def joined(first: Reductions | None, second: Reductions | None) -> Reductions | 
 def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> Reduction:
     # Chan, Golub & LeVeque 1983: from deviations, not from raw squares
     apart = second.mean - first.mean
-    high = first if first.maximum > second.maximum else second
-    low = first if first.minimum < second.minimum else second
+    high = first if first.maximum >= second.maximum else second
+    low = first if first.minimum <= second.minimum else second
     return replace(
         high,
         minimum=low.minimum,
