@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.kinks import crossings, find_kinks, rank_differences
+from ballpass.runtime.quantity.kinks import crossings, rank_differences
 from ballpass.runtime.quantity.nodes import Edges, place
 from ballpass.runtime.quantity.panels import GAUSS, interpolated, panels_between, plan_of
 
@@ -52,7 +52,7 @@ def test_only_a_change_of_the_most_loaded_ball_is_a_kink() -> None:
     signals, counts = rank_differences(
         segment, np.stack([np.sin(t), np.cos(t), 0.9 - 0.3 * (t - np.pi / 4.0) ** 2], axis=1)
     )
-    found = find_kinks(t, segment, signals, length=t[-1], edges=t[[0, -1]], counts=counts)
+    found = crossings(t, segment, *signals.T, counts=counts.T)
     assert np.min(np.abs(found - 1.25 * np.pi)) < 1e-6
     assert np.min(np.abs(found - 0.25 * np.pi)) > 0.1
 

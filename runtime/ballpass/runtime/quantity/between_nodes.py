@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, Nodes, find, fixed_nodes
+from ballpass.runtime.quantity.nodes import APART, Edges, Nodes, find, fixed_nodes
 from ballpass.runtime.quantity.track import Signal, Track
 
 Array = NDArray[np.float64]
@@ -27,9 +27,6 @@ GRID, ROUNDS = 65, 2
 
 #: Most that a smooth extreme lies beyond the best point of its grid, over the range of values there [1].
 SMOOTH = 1e-2
-
-#: Extremes nearer to each other than this share of the run are one.
-APART = 1e-9
 
 #: Most nodes to refine around: the best that no neighbour exceeds.  Then the first of those that are lower by less than
 #: this share of the range of values, which an equal extreme between nodes may be.

@@ -20,9 +20,6 @@ Array = NDArray[np.float64]
 #: The output that shows where contacts begin and end.
 DEFLECTION = "ball.deflection"
 
-#: Kinks nearer to each other, or to an edge, than this share of the time that counts are taken as one [1].
-APART = 1e-9
-
 #: Halvings that locate a kink on the cubic through four nodes.
 HALVINGS = 45
 
@@ -75,31 +72,6 @@ def _cubics(nodes: Array, values: Array) -> Array:
         for k in range(1, 4):
             found[:, k:] = (found[:, k:] - found[:, k - 1 : -1]) / (nodes[:, k:] - nodes[:, :-k])
     return found
-
-
-def find_kinks(
-    t: Array,
-    segment: NDArray[np.int_],
-    signals: Array,
-    *,
-    length: float,
-    edges: Array,
-    counts: NDArray[np.bool_] | None = None,
-) -> Array:
-    """Times at which signals pass zero, increasing, apart from each other and from the edges [s].
-
-    Parameters
-    ----------
-    t, segment : places, shape (n,)
-    signals : shape (n, signals)
-    length : of the time that counts [s]
-    edges : times that are edges already [s]
-    counts : at which places each signal counts, shape (n, signals); None: at all
-    """
-    times = np.sort(crossings(t, segment, *signals.T, counts=None if counts is None else counts.T))
-    behind = np.clip(np.searchsorted(edges, times), 1, len(edges) - 1)
-    times = times[np.minimum(np.abs(times - edges[behind - 1]), np.abs(edges[behind] - times)) > APART * length]
-    return times[np.diff(times, prepend=-np.inf) > APART * length]
 
 
 def rank_differences(segment: NDArray[np.int_], table: Array) -> tuple[Array, NDArray[np.bool_]]:

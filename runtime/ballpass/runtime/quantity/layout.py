@@ -20,7 +20,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import EQUAL, reduction_rows
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
-from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks, rank_differences
+from ballpass.runtime.quantity.kinks import DEFLECTION, crossings, rank_differences
 from ballpass.runtime.quantity.nodes import (
     Edges,
     NodePlan,
@@ -46,7 +46,7 @@ from ballpass.runtime.quantity.panels import (
     split,
     uniform_panels,
 )
-from ballpass.runtime.quantity.passages import Passages, find_passages, find_wraps, jumps_at, no_passages
+from ballpass.runtime.quantity.passages import EdgeDistances, JumpDistance, Passages, find_passages, jumps_at
 from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
@@ -85,8 +85,8 @@ class Layout:
     still : whether they follow from time alone, so that no state has to be known
     kept : steps of the run
     segments : of the driver
-    edges, passages, panels, plan : where nodes lie; no panels where moments alone are asked for
-    wraps : times among the edges at which the channel of integrals, an angle, jumps by a turn [s]
+    edges, panels, plan : where nodes lie; no panels where moments alone are asked for
+    passages : edges that the motion moves, those of windows and of jumps of an angle
     track, signals : states and channels along them
     extremes : by quantity and "max" or "min", the best first
     """
@@ -96,8 +96,7 @@ class Layout:
     kept: Array
     segments: Segments
     edges: Edges
-    passages: Passages
-    wraps: Array
+    passages: tuple[Passages, ...]
     panels: Panels | None
     plan: NodePlan
     track: Track | None
@@ -163,8 +162,7 @@ class NodeLayer:
             kept=kept,
             segments=segments,
             edges=make_edges(run, segments, None),
-            passages=no_passages(),
-            wraps=np.zeros(0),
+            passages=(),
             panels=None,
             plan=no_nodes(),
             track=None,
@@ -186,7 +184,13 @@ class NodeLayer:
                 continue
             kinks = (kept[:, 1] > 0.0) & sort.graded
             here = self._along(run, here, self._panels(run, here, kinks))
-            found += self._refined(run, self._with_wraps(run, here, kinks) if sort.wrapped else here, kinks)
+            if sort.wrapped:
+                angle = JumpDistance(self._channels.only(channels_of(items)))
+                here = self._with_passages(run, here, kinks, angle)
+            if not sort.still and self.model.manifest.edges:
+                # an extreme where a load begins moves with it, so that extremes need passages as well
+                here = self._with_passages(run, here, kinks, EdgeDistances(self.model))
+            found += self._refined(run, here, kinks)
         return [self._with_extremes(run, one, row) for one in found]
 
     def _panels(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
@@ -245,27 +249,21 @@ class NodeLayer:
         )
         return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
 
-    def _with_wraps(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Layout:
-        """The same with edges where the channel of all quantities, an angle, jumps by a turn."""
+    def _with_passages(
+        self, run: Run, layout: Layout, kinks: NDArray[np.bool_], angles: EdgeDistances | JumpDistance
+    ) -> Layout:
+        """The same with edges where angles pass zero."""
         assert layout.track is not None
-        angle = self._channels.only(channels_of(layout.items))
-        times = find_wraps(run, layout.track, angle, still=layout.still)
-        if not len(times):
+        passed = find_passages(run, layout.track, angles, layout.kept, still=layout.still)
+        if not len(passed.times):
             return layout
-        edges = with_passages(layout.edges, times, np.zeros((len(times), 0)))
-        layout = replace(layout, edges=edges, wraps=times, panels=None)
+        edges = with_passages(layout.edges, passed.times, np.zeros((len(passed.times), 0)))
+        layout = replace(layout, edges=edges, passages=(*layout.passages, passed), panels=None)
         return self._along(run, layout, self._panels(run, layout, kinks))
 
     def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
         """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
         assert layout.track is not None
-        if not layout.still and not layout.passages.edges:
-            # an extreme where a load begins moves with it, so that extremes need passages as well
-            passages = find_passages(run, layout.track)
-            if passages.edges:
-                edges = with_passages(layout.edges, passages.times, np.zeros((len(passages.times), 0)))
-                layout = replace(layout, edges=edges, passages=passages, panels=None)
-                layout = self._along(run, layout, self._panels(run, layout, kinks))
         assert layout.panels is not None
         each = []
         for item in layout.items:
@@ -304,7 +302,7 @@ class NodeLayer:
                 close = np.count_nonzero(high >= np.max(low, axis=1, keepdims=True), axis=1) > 1
                 t, segment, table = _between_nodes(layout, forces, close)
                 signals, counts = rank_differences(segment, table)
-                times = find_kinks(t, segment, signals, length=run.duration, edges=layout.edges.times, counts=counts)
+                times = crossings(t, segment, *signals.T, counts=counts.T)
             each.append((item, cut_at(layout.panels, layout.edges, times)))
         return self._each_along(run, layout, each)
 
@@ -363,8 +361,7 @@ class NodeLayer:
         t, segment, signals = _between_nodes(layout, signals, np.any((low < 0.0) & (high > 0.0), axis=1))
         counts = np.ones((len(t), count), dtype=bool)
         counts[:, count - forces.shape[1] :] = _taking_part(item, signals[:, count:])
-        edges = layout.edges.times
-        return find_kinks(t, segment, signals[:, :count], length=run.duration, edges=edges, counts=counts)
+        return crossings(t, segment, *signals[:, :count].T, counts=counts.T)
 
     def _is_kinked(self, item: Quantity) -> bool:
         """Whether a quantity integrates an output."""
@@ -393,7 +390,7 @@ class NodeLayer:
         equal = max(run.rtol, EQUAL)
         found = dict(zip(distinct, find_extremes(distinct, track, layout.signals, look, equal), strict=True))
         extremes = {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
-        if layout.passages.edges:
+        if layout.passages:
             extremes = {key: [_beside(one, layout) for one in some] for key, some in extremes.items()}
         return replace(layout, extremes=extremes)
 
@@ -500,9 +497,9 @@ def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
 
 def _beside(extreme: Extreme, layout: Layout) -> Extreme:
     """An extreme where a load begins or ends is at a corner of the channel, and moves with it."""
-    edges, passages = layout.edges, layout.passages
-    beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
-    if not len(beside):
-        return extreme
-    edge = int(np.searchsorted(edges.times, passages.times[beside[0]]))
-    return replace(extreme, segment=edge - 1, fraction=1.0)
+    for passages in layout.passages:
+        beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
+        if len(beside):
+            edge = int(np.searchsorted(layout.edges.times, passages.times[beside[0]]))
+            return replace(extreme, segment=edge - 1, fraction=1.0)
+    return extreme

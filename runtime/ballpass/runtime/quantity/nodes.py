@@ -23,6 +23,9 @@ from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]
 
+#: The resolution of cuts: times nearer to each other than this share of an interval, or of the run, are one [1].
+APART = 1e-9
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Edges:
@@ -103,7 +106,7 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     RequestError
         Several loads switch at one time, and a parameter moves one of them away from another.
     """
-    times, near = segments.times, 1e-9 * min(run.turn, run.duration)
+    times, near = segments.times, APART * min(run.turn, run.duration)
     first = int(np.argmin(np.abs(times - run.start)))
     columns = np.zeros((len(times), 0 if chain is None else len(chain.names)))
     if chain is not None:

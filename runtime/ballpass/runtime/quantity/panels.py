@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, NodePlan
+from ballpass.runtime.quantity.nodes import APART, Edges, NodePlan
 
 Array = NDArray[np.float64]
 
@@ -55,9 +55,6 @@ PARTS = 8
 
 #: A step is too long for a square root at a kink beyond its end that is nearer than this share of its length [1].
 NEAR_KINK = 0.5
-
-#: Ends nearer to each other than this share of an interval are one [1].
-APART = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,7 +1,8 @@
 """Moments at which angles that the motion decides pass edges of windows, and how these move with the parameters.
 
 In: a run along nodes.  Out: `Passages`; for users, `passing_times` of all edges of a run.  A load begins or ends there,
-or a ball enters a spall or leaves it: rates of states jump, and so may outputs.
+or a ball enters a spall or leaves it: rates of states jump, and so may outputs.  An angle that is integrated jumps by a
+turn, which is a passage as well.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.quantity.kinks import APART, crossings
-from ballpass.runtime.quantity.nodes import Edges, fixed_nodes, make_edges, place
+from ballpass.runtime.quantity.kinks import crossings
+from ballpass.runtime.quantity.nodes import APART, Edges, fixed_nodes, make_edges, place
 from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
 from ballpass.runtime.run.directions import Chain
@@ -39,32 +40,27 @@ ROUNDING, NEWTON = 1e-12, 3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Passages:
-    """Moments just before edges, in order.
+    """Moments at which angles pass zero, in order.
 
     Attributes
     ----------
     times : shape (passages,) [s]
     forward : whether the angle grows then, shape (passages,)
-    edges : parameter or constant that is the angle of each edge
-    columns : place of each edge among all of the model
-    before : how long before the edges [s]
+    columns : which angle, shape (passages,)
+    before : how long before zero the moments are [s]
+    angles : those that pass
     """
 
     times: Array
     forward: NDArray[np.bool_]
-    edges: tuple[str, ...]
     columns: NDArray[np.int_]
     before: float
+    angles: EdgeDistances | JumpDistance
 
     @property
     def near(self) -> float:
         """Times as near as this to one of them count as equal [s]."""
         return 10.0 * self.before
-
-
-def no_passages() -> Passages:
-    """Of no edge."""
-    return Passages(times=np.zeros(0), forward=np.zeros(0, bool), edges=(), columns=np.zeros(0, int), before=0.0)
 
 
 class EdgeDistances(ChannelValues):
@@ -74,6 +70,8 @@ class EdgeDistances(ChannelValues):
         super().__init__(model, ())
         count = model.symbolic("windows").size1_out(0)
         self._columns = [("distance", count), ("rate", count)]
+        edges = model.manifest.edges
+        self.which, self.before = [edges.index(edge) for edge in dict.fromkeys(edges)], BEFORE
 
     def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         graph = self._model.symbolic("windows")
@@ -85,37 +83,68 @@ class EdgeDistances(ChannelValues):
         distance, rate = np.split(found, 2, axis=1)
         return {"distance": distance, "rate": rate}
 
+    def past(self, track: Track, numbers: Numbers) -> tuple[Array, Array]:
+        """Both along a track, shape (nodes, edges) each."""
+        found = self.along(track, numbers)
+        return found["distance"].value, found["rate"].value
 
-def find_passages(run: Run, track: Track) -> Passages:
-    """Passages of all edges along a track; none where no window has an angle that the motion decides."""
-    manifest, nodes = run.model.manifest, track.nodes
-    before = BEFORE * min(run.turn, run.duration)
-    found: list[tuple[float, str]] = []
-    if manifest.edges:
-        distances = EdgeDistances(run.model)
-        beyond = distances.along(track, run.numbers)["distance"].value
-        for edge in dict.fromkeys(manifest.edges):
-            behind = np.sin(0.5 * beyond[:, manifest.edges.index(edge)])
-            found += [(time, edge) for time in crossings(nodes.t, nodes.segment, behind).tolist()]
-    apart = max(APART * run.duration, 10.0 * before)
-    found = [item for item in sorted(found) if np.min(np.abs(track.edges.times - item[0])) > apart]
-    times = np.array([time for time, _ in found])
-    columns = np.array([manifest.edges.index(edge) for _, edge in found], dtype=int)
-    rates = np.zeros(len(found))
-    if found:
-        # by Newton, from the sign changes at the nodes
-        seen, rows = distances.along(_there(run, track, times), run.numbers), np.arange(len(found))
-        left = -np.angle(np.exp(1j * seen["distance"].value[rows, columns]))
-        rates = seen["rate"].value[rows, columns]
-        # of the fastest turn: one at the first speed of a run-up from rest has no end
-        before = BEFORE / max(BEFORE / before, float(np.max(np.abs(rates))) / TURN)
-        times = times + left / rates - before
+    def slopes(self, track: Track, numbers: Numbers, chain: Chain) -> Array:
+        """Derivatives of the angles, shape (nodes, edges, directions)."""
+        return self.along(track, numbers, chain)["distance"].slope
+
+
+class JumpDistance:
+    """The angle of a channel beyond the place where it jumps by a turn, as `EdgeDistances`."""
+
+    def __init__(self, angle: ChannelValues) -> None:
+        (self._channel,), self._angle = angle.channels, angle
+        at = jumps_at(self._channel)
+        assert at is not None  # it is an angle
+        self._at, self.which, self.before = at, [0], 0.0
+
+    def past(self, track: Track, numbers: Numbers) -> tuple[Array, Array]:
+        """As of `EdgeDistances`."""
+        value, rate = self._angle.with_rates(track, numbers)
+        return value - self._at, rate
+
+    def slopes(self, track: Track, numbers: Numbers, chain: Chain) -> Array:
+        """As of `EdgeDistances`."""
+        return self._angle.along(track, numbers, chain)[self._channel].slope
+
+
+def find_passages(
+    run: Run, track: Track, angles: EdgeDistances | JumpDistance, kept: Array, *, still: bool
+) -> Passages:
+    """Passages of angles along a track, apart from its edges.
+
+    Parameters
+    ----------
+    kept : steps of the run
+    still : whether the angles follow from time alone
+    """
+    beyond, _ = angles.past(track, run.numbers)
+    # what stands at half a turn is on either side of it by rounding
+    across = np.where((np.cos(beyond) > 0.0) & (np.abs(np.sin(beyond)) > ROUNDING), np.sin(beyond), 0.0)
+    each = [crossings(track.nodes.t, track.nodes.segment, across[:, k]) for k in angles.which]
+    times, columns = np.concatenate([np.zeros(0), *each]), np.repeat(angles.which, [len(one) for one in each])
+    rates = np.zeros(len(times))
+    for _ in range(NEWTON if len(times) else 0):
+        order = np.argsort(times, kind="stable")
+        times, columns, rows = times[order], columns[order], np.arange(len(times))
+        past, every = angles.past(_there(run, track, times, kept=kept, still=still), run.numbers)
+        rates = every[rows, columns]
+        times = times - np.angle(np.exp(1j * past[rows, columns])) / rates
+    # of the fastest turn: one at the first speed of a run-up from rest has no end
+    fastest = float(np.max(np.abs(rates), initial=0.0)) / TURN
+    before = angles.before / max(1.0 / min(run.turn, run.duration), fastest)
+    distance = np.min(np.abs(track.edges.times[:, None] - times), axis=0)
+    kept_ones = distance > max(APART * run.duration, 10.0 * before)
     return Passages(
-        times=times,
-        forward=rates > 0.0,
-        edges=tuple(edge for _, edge in found),
-        columns=columns,
+        times=times[kept_ones] - before,
+        forward=rates[kept_ones] > 0.0,
+        columns=columns[kept_ones],
         before=before,
+        angles=angles,
     )
 
 
@@ -141,7 +170,7 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
         passed = _passages_of(run)
         at = passed.times + passed.before
         for edge in dict.fromkeys(model.manifest.edges):
-            parts[edge].append(at[[name == edge for name in passed.edges]])
+            parts[edge].append(at[passed.columns == model.manifest.edges.index(edge)])
     return {edge: np.unique(np.concatenate(times)) for edge, times in parts.items()}
 
 
@@ -151,14 +180,14 @@ def entering_times(run: Run) -> dict[str, Array]:
     Of spalls whose edges are met when the motion decides.  A ball enters by either edge, as the rings turn.
     """
     passed = _passages_of(run)
-    at = passed.times + passed.before
+    at, names = passed.times + passed.before, [run.model.manifest.edges[k] for k in passed.columns]
     spalls = dict.fromkeys(edge.rpartition(".")[0] for edge in run.model.manifest.edges if "defects." in edge)
     ways = ((".begin", True), (".end", False))
     return {
         spall: np.array(
             [
                 time
-                for time, edge, forward in zip(at.tolist(), passed.edges, passed.forward.tolist(), strict=True)
+                for time, edge, forward in zip(at.tolist(), names, passed.forward.tolist(), strict=True)
                 if (edge.removeprefix(spall), forward) in ways
             ]
         )
@@ -175,18 +204,19 @@ def _passages_of(run: Run) -> Passages:
     segments = segments_of(run)
     edges = make_edges(run, segments, None)
     panels = panels_between(edges, cuts, np.zeros(len(cuts), dtype=bool))
-    return find_passages(run, follow(run, segments, edges, place(plan_of(panels, edges), edges), kept=kept))
+    track = follow(run, segments, edges, place(plan_of(panels, edges), edges), kept=kept)
+    return find_passages(run, track, EdgeDistances(run.model), kept, still=False)
 
 
-def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:
+def passage_slopes(
+    run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float, *, still: bool
+) -> Array:
     """Derivatives of the times of passages along the directions, shape (passages, directions) [s/unit]."""
-    if not passages.edges:
-        return np.zeros((0, len(chain.names)))
-    seen = _there(run, track, passages.times, chain, sensitivity_rtol)
+    seen = _there(run, track, passages.times, chain, sensitivity_rtol, still=still)
     # angles and their rates do not jump at an edge: either side gives them
-    found, rows = EdgeDistances(run.model).along(seen, run.numbers, chain), np.arange(len(passages.edges))
-    rate = found["rate"].value[rows, passages.columns]
-    return np.asarray(-found["distance"].slope[rows, passages.columns] / rate[:, None])
+    _, rates = passages.angles.past(seen, run.numbers)
+    slopes, rows = passages.angles.slopes(seen, run.numbers, chain), np.arange(len(passages.times))
+    return np.asarray(-slopes[rows, passages.columns] / rates[rows, passages.columns, None])
 
 
 def jumps_at(channel: str) -> float | None:
@@ -197,41 +227,11 @@ def jumps_at(channel: str) -> float | None:
     return np.pi if in_half_turns or (channel.startswith("body.") and channel.endswith(".angle")) else None
 
 
-def find_wraps(run: Run, track: Track, angle: ChannelValues, *, still: bool) -> Array:
-    """Times at which an angle jumps by a turn, shape (wraps,) [s].
-
-    Parameters
-    ----------
-    angle : the channel
-    still : whether it follows from time alone
-    """
-    at = jumps_at(angle.channels[0])
-    assert at is not None  # it is an angle
-    past = angle.along(track, run.numbers)[angle.channels[0]].value[:, 0] - at
-    # a body that stands at pi is on either side of it by rounding
-    across = np.where((np.cos(past) > 0.0) & (np.abs(np.sin(past)) > ROUNDING), np.sin(past), 0.0)
-    times = crossings(track.nodes.t, track.nodes.segment, across)
-    for _ in range(NEWTON if len(times) else 0):
-        value, rate = (found[:, 0] for found in angle.with_rates(_there(run, track, times, still=still), run.numbers))
-        times = times - np.angle(np.exp(1j * (value - at))) / rate
-    edges = track.edges.times
-    return np.array([time for time in times.tolist() if np.min(np.abs(edges - time)) > APART * run.duration])
-
-
-def wrap_slopes(
-    run: Run, track: Track, times: Array, angle: ChannelValues, chain: Chain, sensitivity_rtol: float, *, still: bool
-) -> Array:
-    """Derivatives of the times of `find_wraps` along the directions, shape (wraps, directions) [s/unit]."""
-    seen = _there(run, track, times, chain, sensitivity_rtol, still=still)
-    _, rate = angle.with_rates(seen, run.numbers)
-    return np.asarray(-angle.along(seen, run.numbers, chain)[angle.channels[0]].slope[:, 0] / rate)
-
-
 def jumps_at_edges(
     run: Run,
     track: Track,
     edges: Edges,
-    angle: ChannelValues,
+    angle: JumpDistance,
     chain: Chain,
     sensitivity_rtol: float,
     *,
@@ -243,24 +243,20 @@ def jumps_at_edges(
 
     Parameters
     ----------
-    edges : without those of `find_wraps`
+    edges : without those of passages
 
     Returns
     -------
     edges, and whether the jump leaves an edge, shape (directions,)
     """
-    at = jumps_at(angle.channels[0])
-    assert at is not None  # it is an angle
     seen = _there(run, track, edges.times, chain, sensitivity_rtol, still=still)
-    value, rate = angle.with_rates(seen, run.numbers)
+    past, rate = angle.past(seen, run.numbers)
     order = np.arange(len(edges.times))
-    jump = (np.abs(np.exp(1j * (value[:, 0] - at)) - 1.0) <= APART * run.duration * np.abs(rate[:, 0])) & (
-        order >= edges.first
-    )
+    jump = (np.abs(np.exp(1j * past[:, 0]) - 1.0) <= APART * run.duration * np.abs(rate[:, 0])) & (order >= edges.first)
     if not np.any(jump):
         return edges, np.zeros(len(chain.names), dtype=bool)
     slopes = edges.slopes.copy()
-    slopes[jump] = -angle.along(seen, run.numbers, chain)[angle.channels[0]].slope[jump, 0] / rate[jump]
+    slopes[jump] = -angle.slopes(seen, run.numbers, chain)[jump, 0] / rate[jump]
     free = jump & still & (order > edges.first) & (order < order[-1])
     leaves = jump[:, None] & ~free[:, None] & ~np.isclose(slopes, edges.slopes, rtol=1e-6, atol=0.0)
     slopes[jump & ~free] = edges.slopes[jump & ~free]
@@ -274,9 +270,10 @@ def _there(
     chain: Chain | None = None,
     sensitivity_rtol: float | None = None,
     *,
-    still: bool = False,
+    kept: Array | None = None,
+    still: bool,
 ) -> Track:
     """The run at these fixed times."""
     held = np.clip(np.searchsorted(track.segments.times, times) - 1, 0, None)
     nodes = fixed_nodes(times, held, held, 0 if chain is None else len(chain.names))
-    return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol, still=still)
+    return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol, kept=kept, still=still)

@@ -38,7 +38,7 @@ from ballpass.runtime.quantity.nodes import (
     with_points,
 )
 from ballpass.runtime.quantity.panels import GAUSS, ROUGH
-from ballpass.runtime.quantity.passages import jumps_at, jumps_at_edges, passage_slopes, wrap_slopes
+from ballpass.runtime.quantity.passages import JumpDistance, jumps_at, jumps_at_edges, passage_slopes
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.ratings.of_bearing import bearing_words
@@ -300,17 +300,12 @@ class QuantityRun:
         leaves = np.zeros(len(chain.names), dtype=bool)
         if any(kind_of(item).integrates and jumps_at(item.channel) is not None for item in layout.items):
             assert track is not None
-            angle = self._channels.only(channels_of(layout.items))
+            angle = JumpDistance(self._channels.only(channels_of(layout.items)))
             edges, leaves = jumps_at_edges(run, track, edges, angle, chain, sensitivity_rtol, still=layout.still)
-        if len(layout.wraps):
+        for passages in layout.passages:
             assert track is not None
-            angle = self._channels.only(channels_of(layout.items))
-            slopes = wrap_slopes(run, track, layout.wraps, angle, chain, sensitivity_rtol, still=layout.still)
-            edges = with_passages(edges, layout.wraps, slopes)
-        if layout.passages.edges:
-            assert track is not None
-            slopes = passage_slopes(run, track, layout.passages, chain, sensitivity_rtol)
-            edges = with_passages(edges, layout.passages.times, slopes)
+            slopes = passage_slopes(run, track, passages, chain, sensitivity_rtol, still=layout.still)
+            edges = with_passages(edges, passages.times, slopes)
         return edges, leaves
 
     def _at_rest(self, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
