@@ -62,6 +62,9 @@ Array = NDArray[np.float64]
 #: Passes that make panels of outputs of time alone finer, and the most nodes that panels may come to.
 PASSES, MOST = 6, 2**19
 
+#: Passes that cut panels where balls change rank: a third ball between two shows in the panels that end there.
+RANKED = 2
+
 #: Parts of each panel at least, where balls are followed over places of a raceway.
 HATS = 4
 
@@ -287,7 +290,7 @@ class NodeLayer:
         groups = [(panels, replace(layout, items=tuple(items))) for panels, items in shared.values()]
         return [here if panels is layout.panels else self._along(run, here, panels) for panels, here in groups]
 
-    def _ranked(self, run: Run, layout: Layout) -> list[Layout]:
+    def _ranked(self, run: Run, layout: Layout, passes: int = RANKED) -> list[Layout]:
         """Panels that end where another ball becomes the most loaded one, for quantities of that ball.
 
         The balls' forces are smooth within the panels, so that two changes between two nodes are found as well.
@@ -304,7 +307,11 @@ class NodeLayer:
                 signals, counts = rank_differences(segment, table)
                 times = crossings(t, segment, *signals.T, counts=counts.T)
             each.append((item, cut_at(layout.panels, layout.edges, times)))
-        return self._each_along(run, layout, each)
+        found = []
+        for here in self._each_along(run, layout, each):
+            again = passes > 1 and here.panels is not layout.panels
+            found += self._ranked(run, here, passes - 1) if again else [here]
+        return found
 
     def _parts(self, run: Run, layout: Layout, item: Quantity) -> NDArray[np.int_]:
         """Into how many parts each panel is to be split; none where there would be too many."""
