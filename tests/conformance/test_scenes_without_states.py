@@ -290,7 +290,9 @@ def test_a_scene_without_bearings_whose_driver_is_a_state_answers_what_has_a_mea
     """`jacobian` was refused for want of a bearing, with the advice to write the folder again."""
     for command in ("life", "linearize", "section", "steady"):
         assert "this scene has no bearing" in _said(ballpass(command, f"{scene}.toml"), 2)
-    said = _said(ballpass("jacobian", f"{scene}.toml", "--of=reaction.A.x", f"--wrt={MASS}", "--json"), 0)
+    said = _said(
+        ballpass("jacobian", f"{scene}.toml", "--of=reaction.A.x", f"--wrt={MASS}", "--wrt=states", "--json"), 0
+    )
     assert "verified" in said
 
 

@@ -228,6 +228,17 @@ def test_turnings_with_rests_and_reversals_equal_a_dense_search(
     assert (last is None and not len(found)) or last == pytest.approx(found[-1], abs=1e-12)
 
 
+@pytest.mark.parametrize("rate", [7.0, -7.0])
+@pytest.mark.parametrize("end", [0.95, 1.3, 4.0, 40.0])
+def test_the_last_pass_before_the_end_is_the_last_of_all(rate: float, end: float) -> None:
+    """Clockwise times fall as whole turns grow: the first of two passes was taken for the last."""
+    turning = Turning.even(0.3, rate)
+    times = turning.passes(1.0, 0.0, end)
+    assert np.all(np.diff(times) > 0.0)
+    assert turning.last_pass(1.0, end) == pytest.approx(times[-1], rel=1e-14)
+    assert turning.first_pass(1.0) == pytest.approx(times[0], rel=1e-14)
+
+
 def test_rows_of_equal_value_are_no_rows() -> None:
     values = {**SPEEDS, **LAGS, "start": 0.0, "speed": 3.0, **dict.fromkeys(("v1", "v2", "v3", "v4"), 3.0)}
     manifest = of(PHASE, turning=replace(ROWS, lag_times=(), lags=(), lag="", rolling=""))

@@ -265,7 +265,9 @@ def _read(root: Table, name: str) -> Scene:
             _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads)
         speeds = mechanism.driver.table if mechanism is not None else None
-        span = speeds.time[-1].value if speeds is not None and speeds.time else None
+        # rows of equal speed are those of a constant one
+        unlike = {q.value for q in (mechanism.driver.speed, *speeds.later_speed)} if mechanism and speeds else set()
+        span = speeds.time[-1].value if speeds is not None and len(unlike) > 1 else None
         run, outputs = _read_run(root.table("run", required=False), cycle * math.ceil(STEADY_CYCLES / cycle), span)
         given = root.data.get("run")
         turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
@@ -314,7 +316,7 @@ def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Seq
 def _read_run(table: Table, steady: int, span: float | None) -> tuple[RunSettings, tuple[str, ...]]:
     """Length, samples and method of a run, and the names of its outputs.
 
-    Without a length it takes the `span` of the driver's table of speeds [s], or else `steady` turns count.
+    Without a length it takes the `span` of a table in which the speed changes [s], or else `steady` turns count.
     """
     if table.missing:  # not a fault
         table = Table(table.collector, table.path, {})

@@ -58,7 +58,8 @@ def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
     if settings.stated or settings.cycles is None or not math.isfinite(turn):
         return []
     begin = settings.transient_cycles * turn
-    rows = timeline.rows_over_time(model.manifest, values, 0.0, begin)
+    changes = timeline.changes_over_time(model.manifest, values, 0.0, begin)
+    rows = timeline.rows_over_time(model.manifest, values, 0.0, begin if changes else 0.0)
     slowest, length = timeline.longest_harmonic(model.manifest, values), settings.cycles * turn - begin
     if not len(rows) and slowest > length * (1.0 + 1e-9):
         return [

@@ -215,7 +215,10 @@ def _motion(
         return 0.0, step * abs(rate), lambda v: values_of_rows(model, parts, {**there, "t": v / rate})
     if name in model.states:
         k = model.states.index(name)
-        size = max(float(np.max(np.abs(x[_same_kind(model, k)]))), STEP_FROM_ZERO[unit])
+        alike = [
+            info.unit == unit for info in model.manifest.states
+        ]  # a driver's angle is no measure of a ring's place
+        size = max(float(np.max(np.abs(x[alike]))), STEP_FROM_ZERO.get(unit, STEP))
 
         def with_state(v: float) -> Array:
             moved = x.copy()
@@ -229,11 +232,6 @@ def _motion(
         return values_of_rows(model, parts, point(model, neighbour(model, numbers, {name: v}), t, x))
 
     return base, STEP * abs(base) or STEP_FROM_ZERO.get(unit, STEP), with_parameter
-
-
-def _same_kind(model: LoadedModel, k: int) -> slice:
-    half = len(model.states) // 2
-    return slice(0, half) if k < half else slice(half, 2 * half)
 
 
 def _quotient(above: str, below: str) -> str:

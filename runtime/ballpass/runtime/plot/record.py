@@ -101,10 +101,6 @@ class Record:
     def _values(self) -> dict[str, float]:
         return {**self.solution.parameters, **self.solution.constants}
 
-    def table_turns(self, label: str) -> int:
-        """Turns of the driver after which the table of a load repeats, named as ``force.gas``."""
-        return dict(self.mechanism.turns).get(label, 1) if self.manifest.mechanism is not None else 1
-
     @property
     def cycle_turns(self) -> int:
         """Turns after which all loads repeat: two for a four-stroke engine."""
@@ -283,7 +279,7 @@ class Record:
             return float(np.interp(past, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
         columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
         knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
-        return float(np.interp(angle, knots, values, period=full * self.table_turns(f"force.{name}")))
+        return float(np.interp(angle, knots, values, period=full * dict(self.mechanism.turns).get(f"force.{name}", 1)))
 
     def spring_tension(self, label: str) -> Array | None:
         """Tension of a spring or stop between two points, (n,) [N]; None where it was not asked for."""

@@ -124,7 +124,7 @@ def _applied(record: Record, name: str, given: str, place: Mapping[str, int]) ->
         else:
             columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
             found["table"] = [[k for known, k in place.items() if known.startswith(one)] for one in columns]
-            found["turns"] = record.table_turns(f"force.{name}")
+            found["turns"] = dict(record.mechanism.turns).get(f"force.{name}", 1)
     return found
 
 

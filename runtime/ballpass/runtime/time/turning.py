@@ -188,7 +188,7 @@ class Turning:
             low, high = ((e - angle) / period for e in sorted(ends))
             whole = np.arange(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)
             found.append(self._when(angle, period * whole, left, right).clip(left, right))
-        return np.unique(np.concatenate(found)) if len(found) > 1 else found[0]
+        return np.unique(np.concatenate(found)) if len(found) > 1 else np.sort(found[0])  # clockwise they fall
 
     def first_pass(self, angle: float, turns: int = 1) -> float | None:
         """The first time from t = 0 on at which it passes an angle, modulo so many turns [s]; None without one."""
