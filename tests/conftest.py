@@ -132,16 +132,21 @@ def _place(tmp_path_factory: pytest.TempPathFactory, text: str, name: str) -> It
 
 
 @pytest.fixture(scope="session")
-def make_model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
-    """Model of a shipped scene with replacements, generated and compiled once."""
+def model_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Model]:
+    """Model of a scene's text, generated and compiled once."""
 
     @cache
-    def make(name: str, *changes: tuple[str, str]) -> Model:
-        text = scene_text(name, *changes)
+    def make(text: str, name: str = "scene") -> Model:
         with _place(tmp_path_factory, text, name) as folder:
             return load(generate(scene_from_text(text, name), folder))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def make_model(model_of: Callable[..., Model], scene_text: Callable[..., str]) -> Callable[..., Model]:
+    """Model of a shipped scene with replacements, generated and compiled once."""
+    return lambda name, *changes: model_of(scene_text(name, *changes), name)
 
 
 @pytest.fixture(scope="session")

@@ -15,8 +15,8 @@ from ballpass.runtime import Model
 from ballpass.runtime.contract.units import unit_size
 
 SCENES = sorted(path.stem for path in shipped_scenes().values())
-#: How many new units of kilogram, metre and second an old one is.
-NEW = {"kilogram": 8.0, "meter": 4.0, "second": 2.0}
+#: How many new units of mass, length and time an old one is, by the base units of `unit_size`.
+NEW = {"gram": 8.0, "meter": 4.0, "second": 2.0}
 #: Difference of an output over its largest value: the tolerance is relative, and steps differ.
 AGREE = 1e-6
 

