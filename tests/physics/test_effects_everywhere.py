@@ -121,25 +121,23 @@ ONE_WAY = bearing("A", elastic=True, effects=ALL, angle="25 deg").replace('coupl
 
 @pytest.mark.long
 def test_a_table_of_one_speed_gives_the_forces_of_that_speed(tmp_path: Path) -> None:
-    """Effects are functions of time there, and of the state here; each ball's deflection and damping agree."""
+    """Terms by time there, by the angle between the rings here; each ball's deflection and damping agree."""
     even = press(f'{ONE_WAY}[bearings.at_A.inner_ring]\nmass = "0.4 kg"\n')
     steady, table = (
         virtual_model(text, tmp_path / name) for name, text in (("even", even), ("flat", even.replace(SPEED, FLAT)))
     )
-    rng, speed = np.random.default_rng(7), steady.parameters["mechanism.driver.speed"]
+    rng = np.random.default_rng(7)
     names = ["at_A.ball.deflection", "at_A.ball.damping_force"]
     for t in rng.uniform(0.0, 0.2, 8).tolist():
         x = np.concatenate([rng.uniform(-3e-5, 3e-5, 4), rng.uniform(-0.1, 0.1, 4)])
-        driven = np.concatenate([x[:4], [speed * t], x[4:], [speed]])
-        one, other = steady.evaluate(t, x, names), table.evaluate(t, driven, names)
+        one, other = steady.evaluate(t, x, names), table.evaluate(t, x, names)
         for name in names:
             assert other[name] == pytest.approx(one[name], rel=1e-9, abs=1e-9 * np.max(np.abs(one[name])))
 
 
 @pytest.mark.long
-def test_a_slip_that_changes_is_the_same_as_a_state_and_known_before_the_run(tmp_path: Path) -> None:
-    """At constant speed the lag is a table over time, and spalls are met at known times; with a table of one speed the
-    lag is integrated and edges are located."""
+def test_a_slip_that_changes_is_the_same_by_a_speed_and_by_a_table_of_it(tmp_path: Path) -> None:
+    """At constant speed and by a table of one speed: two derivations, spalls met at the same times."""
     effects = LAGGING + SPALL
     even = ONE_WAY.replace(ALL.replace("[bearing.", "[bearings.at_A."), effects.replace("[bearing.", "[bearings.at_A."))
     even = press(f'{even}[bearings.at_A.inner_ring]\nmass = "0.4 kg"\n')
@@ -149,9 +147,6 @@ def test_a_slip_that_changes_is_the_same_as_a_state_and_known_before_the_run(tmp
     one, other = (m.simulate(duration=0.12, transient=0, samples_per_cycle=50, **way) for m in (known, state))
     for name in known.states:
         assert other[name] == pytest.approx(one[name], abs=1e-8 * np.max(np.abs(one[name])))
-    rolled = known.constants()["bearings.at_A.cage_ratio"] * known.parameters["mechanism.driver.speed"]
-    lag = np.deg2rad(2) + rolled * (-0.05 * np.minimum(one.t, 0.03) + 0.25 * np.clip(one.t - 0.03, 0.0, 0.04))
-    assert other["at_A.cage.lag"] == pytest.approx(lag, abs=1e-9)
     for at in (0.02, 0.05, 0.1):
         rest, there = state.static_equilibrium(t=at), known.static_equilibrium(t=at)
         assert rest.ball_force == pytest.approx(there.ball_force, rel=1e-9, abs=1e-9 * there.peak_ball_force)
@@ -169,8 +164,8 @@ def test_a_slip_that_changes_is_the_same_as_a_state_and_known_before_the_run(tmp
 @pytest.mark.long
 def test_points_of_a_lag_that_is_a_state_are_refused(tmp_path: Path) -> None:
     """Its integral grows without end, also behind the last row: a section is on no curve."""
-    model = built(press(bearing("A", effects=CHANGING_SLIP)), tmp_path / "model")
-    asked = (model.steady, model.section, partial(model.bifurcation, "bearings.at_A.clearance=8 um:9 um:2"))
+    model = built(press(bearing("B", "rod", effects=CHANGING_SLIP)), tmp_path / "model")
+    asked = (model.steady, model.section, partial(model.bifurcation, "bearings.at_B.clearance=8 um:9 um:2"))
     for question in asked:
         with pytest.raises(RequestError, match="slip of a cage changes over time"):
             question()
@@ -202,8 +197,9 @@ def test_a_spall_of_the_outer_ring_is_met_at_the_ball_pass_order_of_the_momentar
     def spectrum(chord: float) -> tuple[AmplitudeSpectrum, np.ndarray]:
         """Amplitudes over orders, and which of them are near the line: no multiple of the shaft is."""
         numbers = {"bearings.at_A.defects.spall.chord": chord}
-        run = model.simulate(times=times, duration=2.5, transient=0, rtol=1e-7, parameters=numbers, outputs=[signal])
         even = drive == "constant speed"
+        kept = [signal] if even else [signal, "driver.angle"]
+        run = model.simulate(times=times, duration=2.5, transient=0, rtol=1e-7, parameters=numbers, outputs=kept)
         angle = model.parameters["mechanism.driver.speed"] * times if even else run["driver.angle"]
         rates = np.gradient(angle, times)
         changes = {"constant speed": -1.0, "run-up by a table": 0.3, "motor": 0.01}

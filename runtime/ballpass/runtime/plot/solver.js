@@ -89,9 +89,9 @@ async function solve(values, stale) {
       began = performance.now();
     }
   }
-  if (solver.angle !== null) { // so many samples a turn where the driver is fastest, as means over the run need
+  if (solver.angle !== null || solver.rows) { // so many samples a turn where the driver is fastest, as means over the run need
     let step = 0;
-    for (let k = 1; k < rows.length; k += 1) step = Math.max(step, Math.abs(rows[k][solver.angle] - rows[k - 1][solver.angle]));
+    for (let k = 1; k < rows.length; k += 1) step = Math.max(step, Math.abs(turnedTo(known, rows[k]) - turnedTo(known, rows[k - 1])));
     const wanted = Math.min(Math.round(finer * step * samples / TURN), Math.floor(MOST / base));
     if (wanted > finer) {
       finer = wanted;
@@ -157,8 +157,21 @@ const signalOf = (values, most = greatest(values)) => {
 // Signals of one kind have the same decimals.
 const signalsOf = (columns) => { const most = columns.reduce((found, values) => greatest(values, found), 1e-12); return columns.map((values) => signalOf(values, most)); };
 
+/* Angle of the driver by a table of its speed, linear between rows and constant outside, or where it is a state. */
+function turnedTo(known, row) {
+  if (!solver.rows) return row[solver.angle];
+  const [times, speeds] = solver.rows.map((places) => places.map((place) => known[place])), last = times.length - 1;
+  const speed = (t) => {
+    const k = times.findIndex((time) => time > t);
+    if (k <= 0) return speeds[k < 0 ? last : 0];
+    return speeds[k - 1] + (speeds[k] - speeds[k - 1]) * (t - times[k - 1]) / (times[k] - times[k - 1]);
+  };
+  const edges = [0, ...times.filter((time) => time > 0 && time < row[0]), row[0]];
+  return edges.reduce((sum, t, k) => sum + (k ? 0.5 * (speed(t) + speed(edges[k - 1])) * (t - edges[k - 1]) : 0), known[solver.start]);
+}
+
 function angleOf(run, row) {
-  if (solver.angle !== null) return row[solver.angle];
+  if (solver.angle !== null || solver.rows) return turnedTo(run.known, row);
   return (solver.start === null ? 0 : run.known[solver.start]) + run.speed * row[0];
 }
 

@@ -14,7 +14,7 @@ from typing import Any
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest, UsualInfo, force_components, table_direction
 from ballpass.runtime.contract.plausible_ranges import usual_template
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.export.scene_numbers import columns_of
+from ballpass.runtime.export.scene_numbers import columns_of, speed_table
 from ballpass.runtime.export.web_assembly import drawn_columns
 from ballpass.runtime.native.reduction_rows import DEFLECTION, HEAD, SECTORS, TURNED, ReductionRows, reduction_rows
 from ballpass.runtime.plot.animation import shown_points
@@ -48,6 +48,7 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
         "speed": None if speed is None else place[speed],
         "start": None if mechanism is None else place[mechanism.start_angle],
         "shown": record.cycle_turns,
+        "rows": [[place[name] for name in names] for names in speed_table(manifest)[::-1] if names] or None,
         "angle": column[mechanism.angle] if mechanism is not None and mechanism.angle else None,
         "windows": [[place[start], place[end]] for start, end in record.load_window_edges()],
         "torque": column.get("drive_torque"),

@@ -262,8 +262,7 @@ def input_slopes(
     moved : the direction, by name; names that are missing stand still
     t, inside : as for `inputs_over`
     """
-    found = inputs_over(manifest, along(values, moved), t, inside)
-    return np.asarray(np.imag(found) / STEP)
+    return np.asarray(np.imag(inputs_over(manifest, along(values, moved), t, inside)) / STEP)
 
 
 def angle_slope(info: TurningInfo, values: Values, moved: Mapping[str, float], t: float) -> float:
