@@ -58,7 +58,7 @@ def bearings_on_a_shaft(balls: Sequence[int]) -> str:
 
 
 @pytest.fixture(scope="module")
-def model_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Model]:
+def model_of_case(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Model]:
     def make(text: str) -> Model:
         folder: Path = tmp_path_factory.mktemp("lanes") / "scene"
         return load(generate(scene_from_text(text, "scene"), folder))
@@ -104,8 +104,8 @@ def test_members_of_the_press_are_single_runs_to_the_bit(make_model: Callable[..
 
 @pytest.mark.long
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
-def test_members_with_any_part_are_single_runs_to_the_bit(text: str, model_of: Callable[[str], Model]) -> None:
-    model = model_of(text)
+def test_members_with_any_part_are_single_runs_to_the_bit(text: str, model_of_case: Callable[[str], Model]) -> None:
+    model = model_of_case(text)
     assert {m: differing(model, m, 0.3) for m in ("stepper-dp54", "stepper-rodas5p")} == {
         "stepper-dp54": [],
         "stepper-rodas5p": [],
@@ -113,9 +113,9 @@ def test_members_with_any_part_are_single_runs_to_the_bit(text: str, model_of: C
 
 
 @pytest.mark.long
-def test_forty_rollers_in_lanes_are_those_of_single_runs(model_of: Callable[[str], Model]) -> None:
+def test_forty_rollers_in_lanes_are_those_of_single_runs(model_of_case: Callable[[str], Model]) -> None:
     """And what is reduced of them is that of samples."""
-    model = model_of(FORTY_ROLLERS)
+    model = model_of_case(FORTY_ROLLERS)
     assert {method: differing(model, method, 0.3) for method in METHODS_OF_RUNS} == {
         method: [] for method in METHODS_OF_RUNS
     }
@@ -132,9 +132,9 @@ def test_forty_rollers_in_lanes_are_those_of_single_runs(model_of: Callable[[str
 
 @pytest.mark.long
 @pytest.mark.extreme
-def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of: Callable[[str], Model]) -> None:
+def test_twenty_bearings_on_a_shaft_in_lanes_are_those_of_single_runs(model_of_case: Callable[[str], Model]) -> None:
     """That each is what it is alone says test_cylindrical_roller.py."""
-    assert differing(model_of(bearings_on_a_shaft([5 + k % 6 for k in range(20)])), "stepper-dp54", 0.05) == []
+    assert differing(model_of_case(bearings_on_a_shaft([5 + k % 6 for k in range(20)])), "stepper-dp54", 0.05) == []
 
 
 @pytest.mark.long
