@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -16,7 +16,6 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import NamedPoint, Scene
 from ballpass.derive.variables import Input
-from ballpass.runtime.contract.manifest import TurningInfo
 from ballpass.runtime.time.turning import Turning
 
 UNDAMPED = 'law = "none"'
@@ -164,10 +163,7 @@ class Derived:
     def at(self, t: float, x: np.ndarray, gates: Mapping[str, float]) -> list[np.ndarray]:
         """Rates of the states, outputs, angles of the first balls, places of points, torque by the balances."""
         uneven = any(one.times or one.turns for one in self.system.turnings)
-        turned = {
-            one.name: Turning.of(TurningInfo(**asdict(one)), self._known).held(t if uneven else 0.0, t)
-            for one in self.system.turnings
-        }
+        turned = {one.name: Turning.of(one, self._known).held(t if uneven else 0.0, t) for one in self.system.turnings}
 
         def value(i: Input) -> float:
             if i.kind in ("phase", "angle", "rate", "slope") and i.turning is not None:
@@ -195,7 +191,7 @@ class Derived:
         for gate in self.system.inputs:
             if gate.kind == "gate" and "defects." in gate.name and (turning := gate.turning) is not None:
                 ((first, last),) = gate.windows
-                angle = gate.parts * float(Turning.of(TurningInfo(**asdict(turning)), known).at(t)[0])
+                angle = gate.parts * float(Turning.of(turning, known).at(t)[0])
                 past = (angle - known[first]) % (2 * np.pi)
                 found[gate.name.removeprefix("gate.")] = float(past < known[last] - known[first])
         return found

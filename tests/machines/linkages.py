@@ -18,7 +18,7 @@ from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
 from ballpass.derive.terms import TIME
-from ballpass.derive.variables import Turning
+from ballpass.runtime.contract.manifest import TurningInfo
 
 ANGLE = sp.Symbol("theta", real=True)
 SPEED = sp.Symbol("mechanism.driver.speed", real=True)
@@ -30,7 +30,7 @@ DRIVE = KnownDrive(
     speed=SPEED,
     acceleration=sp.S.Zero,
     description="the driver's speed is constant",
-    turning=Turning(
+    turning=TurningInfo(
         name="driver",
         kind="driver",
         words="the driver",

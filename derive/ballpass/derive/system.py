@@ -49,8 +49,9 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch, Turning
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.manifest import TurningInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -116,7 +117,7 @@ class System:
         return found
 
     @property
-    def turnings(self) -> tuple[Turning, ...]:
+    def turnings(self) -> tuple[TurningInfo, ...]:
         """Angles that are known before a run, of the inputs."""
         return tuple(dict.fromkeys(i.turning for i in self.inputs if i.turning is not None))
 

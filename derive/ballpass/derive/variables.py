@@ -8,6 +8,7 @@ from typing import Literal
 import sympy as sp
 
 from ballpass.derive.terms import Definition
+from ballpass.runtime.contract.manifest import TurningInfo
 
 #: Angle of the body that the drive turns [rad].
 DRIVER_ANGLE = sp.Symbol("driver.angle", real=True)
@@ -26,42 +27,6 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Turning:
-    """An angle that is known before a run; fields as in `manifest.TurningInfo`."""
-
-    name: str
-    kind: Literal["driver", "cage", "pass", "spin", "load"]
-    words: str
-    offset: str
-    rate: str
-    parts: int = 1
-    turns: str = ""
-    times: tuple[str, ...] = ()
-    speeds: tuple[str, ...] = ()
-    rolling: str = ""
-    lag: str = ""
-    lag_times: tuple[str, ...] = ()
-    lags: tuple[str, ...] = ()
-
-    def phase(self, description: str, latex: str) -> Input:
-        """Its angle at the reference time."""
-        return self._at("phase", "rad", description, latex)
-
-    def whole(self, description: str, latex: str) -> Input:
-        """Its angle there with whole turns."""
-        return self._at("angle", "rad", description, latex)
-
-    def rate_input(self, description: str, latex: str) -> Input:
-        """Its rate at the reference time."""
-        return self._at("rate", "rad/s", description, latex)
-
-    def _at(self, kind: Literal["phase", "angle", "rate"], unit: str, description: str, latex: str) -> Input:
-        name = f"{kind}.{self.name}"
-        symbol = sp.Symbol(name, real=True)
-        return Input(name=name, symbol=symbol, kind=kind, unit=unit, description=description, latex=latex, turning=self)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
     """Held constant between breakpoints by the integrator; `kind` and fields as in `manifest.InputInfo`."""
 
@@ -71,12 +36,21 @@ class Input:
     unit: str
     description: str
     latex: str
-    turning: Turning | None = None
+    turning: TurningInfo | None = None
     turns: int = 1
     parts: int = 1
     windows: tuple[tuple[str, str], ...] = ()
     times: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
+
+
+def turned(
+    turning: TurningInfo, description: str, latex: str, kind: Literal["phase", "angle", "rate"] = "phase"
+) -> Input:
+    """A turning at the reference time: its angle within a turn or with whole ones [rad], or its rate [rad/s]."""
+    name, unit = f"{kind}.{turning.name}", "rad/s" if kind == "rate" else "rad"
+    symbol = sp.Symbol(name, real=True)
+    return Input(name=name, symbol=symbol, kind=kind, unit=unit, description=description, latex=latex, turning=turning)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

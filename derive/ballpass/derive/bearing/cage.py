@@ -19,7 +19,8 @@ from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
-from ballpass.derive.variables import Coordinate, Input, StateSwitch, Turning
+from ballpass.derive.variables import Coordinate, Input, StateSwitch, turned
+from ballpass.runtime.contract.manifest import TurningInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,8 +77,8 @@ def _slip(bearing: Bearing, names: Names, rolled: sp.Expr) -> _Slip | None:
     if excess is None:
         return None
     words = "Turns of the balls over the ring that slip is seen from, in one of the driver, if they rolled"
-    turned = names.define(names.constant("rolling_turns"), rolled, "1", words, "N_c")
-    return _Slip(excess=excess, rolling=turned.symbol, constants=(*lag_at_rows(bearing, names), turned))
+    turns = names.define(names.constant("rolling_turns"), rolled, "1", words, "N_c")
+    return _Slip(excess=excess, rolling=turns.symbol, constants=(*lag_at_rows(bearing, names), turns))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +86,7 @@ class _Known:
     """An angle that turns with a known driver [rad]: it, its turning, and the constants of that."""
 
     angle: sp.Expr
-    turning: Turning
+    turning: TurningInfo
     input: Input
     constants: tuple[Definition, ...]
 
@@ -114,7 +115,7 @@ def _known(
     latex = rf"\psi_{{0,{part[0]}}}" if seen else r"\psi_0"
     if spins:
         words, latex = f"{SPIN}{of}, at the reference time", r"\chi_0"
-    turning = Turning(
+    turning = TurningInfo(
         name=f"{bearing.prefix}{part}",
         kind="spin" if spins else "cage" if part == "cage" else "pass",
         words=f"the cage of {names.path}",
@@ -125,13 +126,13 @@ def _known(
     constants: tuple[Definition, ...] = ()
     even = drive is None or drive.even
     if slip is not None or not even:
-        turned = names.define(
+        each_turn = names.define(
             names.constant(f"{part}_turns"), turns, "1", f"Turns of {part.replace('_', ' ')} in one of the driver", "N"
         )
-        constants = (turned,)
+        constants = (each_turn,)
         turning = replace(
             turning,
-            turns=turned.symbol.name,
+            turns=each_turn.symbol.name,
             times=() if drive is None else drive.turning.times,
             speeds=() if drive is None else drive.turning.speeds,
         )
@@ -155,7 +156,7 @@ def _known(
             lags=tuple(symbol.name for symbol in lag_names(bearing, names)),
         )
         angle -= rolling * slip.excess.symbol * passed
-    start = turning.phase(names.words(words), names.latex(latex))
+    start = turned(turning, names.words(words), names.latex(latex))
     return _Known(angle=start.symbol + angle, turning=turning, input=start, constants=constants)
 
 
@@ -350,8 +351,8 @@ def cage_between(
         turnings["outer"] = turnings["cage"]
     if _spins(bearing):
         constants += _spin_constants(bearing, names, over_outer)
-        turned = share * (around * (drive.angle - start) + apart) - behind
-        spin = rolls * turned
+        rolled_on = share * (around * (drive.angle - start) + apart) - behind
+        spin = rolls * rolled_on
         if known_drive is not None:
             over = _known(bearing, names, "spin", rolls * share * around, known_drive, slip if evenly else None, rolls)
             spin = over.angle + rolls * (share * apart - behind)

@@ -26,7 +26,8 @@ from ballpass.derive.scene.records import (
     UnbalanceLoad,
 )
 from ballpass.derive.terms import TIME, Definition, components, symbol_of
-from ballpass.derive.variables import Input, Turning
+from ballpass.derive.variables import Input, turned
+from ballpass.runtime.contract.manifest import TurningInfo
 
 #: How long a load without an end acts, longer than any run [s].
 FOR_EVER = 10**9
@@ -177,13 +178,14 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
 
     def wave(ending: str, at_start: SceneNumber, words: str) -> tuple[Input, Definition]:
         axis = ending.removeprefix(".")
-        turning = Turning(
+        angle = TurningInfo(
             name=f"{load.label}{ending}",
             kind="load",
             words=f"load {load.name}" if load.name else "load",
             offset=at_start.path,
             rate=angular.symbol.name,
-        ).phase(words, rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0")
+        )
+        turning = turned(angle, words, rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0")
         harmonic = Definition(
             symbol=sp.Symbol(f"{load.label}.wave{ending}", real=True),
             expression=sp.cos(turning.symbol + angular.symbol * TIME),

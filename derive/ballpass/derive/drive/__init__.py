@@ -6,7 +6,7 @@ from ballpass.derive.drive.known import KnownDrive, known_drive, shaft_drive
 from ballpass.derive.drive.laws import LAWS
 from ballpass.derive.scene.records import Driver
 
-__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of", "known_drive", "shaft_drive"]
+__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of", "shaft_drive"]
 
 
 def drive_of(driver: Driver, *, alone: bool) -> Drive:

@@ -16,8 +16,8 @@ from ballpass.derive.drive.angle_state import driver_coordinate
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.scene.records import Driver, Shaft
 from ballpass.derive.terms import TIME, Definition, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, Turning
-from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, turned
+from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, TurningInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class KnownDrive(Drive):
     whole : the angle with its whole turns, where the speed changes [rad]
     """
 
-    turning: Turning
+    turning: TurningInfo
     passed: sp.Expr
     passive: Coordinate | None = None
     whole: sp.Expr | None = None
@@ -91,7 +91,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     if driver.table is not None:
         speeds = (*speeds, *(q.path for q in driver.table.later_speed))
         times = tuple(q.path for q in driver.table.time)
-    turning = Turning(
+    turning = TurningInfo(
         name="driver",
         kind="driver",
         words="the driver",
@@ -100,7 +100,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
         times=times,
         speeds=speeds,
     )
-    start = turning.phase(words, r"\theta_{1,0}")
+    start = turned(turning, words, r"\theta_{1,0}")
     if not times:
         passed = symbol_of(driver.speed) * TIME
         angle = _angle(start, passed)
@@ -113,7 +113,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
             turning=turning,
             passed=passed,
         )
-    rate = turning.rate_input("Speed of the driven body at the reference time", r"\omega_{1,0}")
+    rate = turned(turning, "Speed of the driven body at the reference time", r"\omega_{1,0}", "rate")
     slope = Input(
         name=DRIVER_ACCELERATION,
         symbol=sp.Symbol("input.driver.acceleration", real=True),
@@ -131,7 +131,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
         latex=r"\omega_1",
     )
     passed = (rate.symbol + slope.symbol * TIME / 2) * TIME
-    whole = turning.whole("Angle of the driven body, whole turns counted", r"\theta_{1,0}")
+    whole = turned(turning, "Angle of the driven body, whole turns counted", r"\theta_{1,0}", "angle")
     passive = replace(driver_coordinate(), position=sp.Symbol("state.driver.angle", real=True)) if alone else None
     return KnownDrive(
         speed=speed.symbol,
@@ -159,7 +159,7 @@ def _angle(start: Input, passed: sp.Expr) -> Definition:
 
 def shaft_drive(shaft: Shaft) -> KnownDrive:
     """The shaft's angle, zero at t = 0."""
-    turning = Turning(
+    turning = TurningInfo(
         name="shaft",
         kind="driver",
         words="the shaft",
@@ -173,7 +173,7 @@ def shaft_drive(shaft: Shaft) -> KnownDrive:
         speed=speed,
         acceleration=sp.S.Zero,
         description="the shaft's speed is constant",
-        inputs=(turning.phase("Angle of the shaft at the reference time", r"\theta_0"),),
+        inputs=(turned(turning, "Angle of the shaft at the reference time", r"\theta_0"),),
         turning=turning,
         passed=speed * TIME,
     )

@@ -48,7 +48,7 @@ def describe(
         states=tuple(info_of(mf.VariableInfo, s) for s in system.states),
         coordinates=tuple(info_of(mf.CoordinateInfo, c, velocity=c.velocity.name) for c in system.coordinates),
         initial=system.initial,
-        turnings=tuple(info_of(mf.TurningInfo, t) for t in system.turnings),
+        turnings=system.turnings,
         inputs=tuple(
             info_of(mf.InputInfo, i, turning="" if i.turning is None else i.turning.name) for i in system.inputs
         ),

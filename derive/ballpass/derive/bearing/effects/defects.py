@@ -31,7 +31,8 @@ from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
-from ballpass.derive.variables import Input, Turning
+from ballpass.derive.variables import Input
+from ballpass.runtime.contract.manifest import TurningInfo
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -209,7 +210,7 @@ class _SpallContact:
             return (("", "begin", "middle"), ("_out", "middle", "end"))
         return (("", "begin", "end"),)
 
-    def gates(self, turnings: Mapping[str, Turning]) -> tuple[Input, ...]:
+    def gates(self, turnings: Mapping[str, TurningInfo]) -> tuple[Input, ...]:
         """One while a ball is within a part of the spall."""
         prefix, on_ball = self.names.prefix, self.spall.on == "ball"
         of = f" of {self.bearing.name}" if self.bearing.name else ""

@@ -18,7 +18,7 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Key
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names
-from ballpass.derive.variables import Turning
+from ballpass.runtime.contract.manifest import TurningInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ class Passing:
     outer: tuple[sp.Expr, sp.Expr]
     inner: tuple[sp.Expr, sp.Expr]
     spin: tuple[sp.Expr, sp.Expr] | None = None
-    turnings: Mapping[str, Turning] | None
+    turnings: Mapping[str, TurningInfo] | None
 
 
 class Effect(ABC):
