@@ -55,7 +55,7 @@ static void list_wanted(bp_lane_block *b, const double *reduction)
     /* balls are evaluated within the step, or at the end of a part of it */
     const int all_states = b->balls && (!b->guarded || bp_parts(bp_methods[b->method].dense_degree) > 1);
     b->sided = 0;
-    for (int k = BP_NX; k < BP_LOOKED_AT; k++) b->sided |= bp_wants_moments(reduction, k);
+    for (int k = BP_NX; k < BP_LOOKED_AT; k++) b->sided |= bp_cuts_moments(reduction, k);
     for (int k = 0; k < BP_LOOKED_AT; k++) {
         double extreme = 0.0, any = (double)all_states;
         for (int e = 0; e < BP_EXTREMES; e++) extreme += wanted[e * BP_CHANNELS + k];
@@ -172,7 +172,7 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
     BP_EACH_MOMENT(BP_OF_DEGREE)
 #undef BP_OF_DEGREE
     for (int k = BP_NX; k < BP_LOOKED_AT && b->sided; k++)
-        for (int lane = 0; lane < BP_L && bp_wants_moments(b->wanted, k); lane++) {
+        for (int lane = 0; lane < BP_L && bp_cuts_moments(b->wanted, k); lane++) {
             b->cut[k * BP_L + lane] *= add[lane];
             any[lane] += b->cut[k * BP_L + lane];
             of_balls[lane] += b->cut[k * BP_L + lane];
@@ -185,7 +185,7 @@ static void reduce_part(const bp_job *job, bp_lane_block *b, double part, double
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
         const bp_within step = {b->start[lane] + b->t[lane] + part * b->h[lane], span * b->h[lane], 1.0, &source.n, lane_state, &source, balls};
         for (int k = BP_NX; k < BP_LOOKED_AT && b->sided; k++) {
-            if (b->cut[k * BP_L + lane] == 0.0 || !bp_wants_moments(b->wanted, k)) continue;
+            if (b->cut[k * BP_L + lane] == 0.0 || !bp_cuts_moments(b->wanted, k)) continue;
             double mean[BP_MOMENTS];
             bp_moments_between(&step, k - BP_NX, b->shift[k * BP_L + lane], mean);
             for (int m = 0; m < BP_MOMENTS; m++) b->moment[m][k * BP_L + lane] += span * b->h[lane] * mean[m];

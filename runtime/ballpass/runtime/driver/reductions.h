@@ -578,12 +578,12 @@ static void bp_rank_cuts(bp_cuts *cuts, const bp_within *step, int row, const do
     bp_cut(cuts, at);
 }
 
-/* Whether moments of a channel are wanted. */
-static inline int bp_wants_moments(const double *reduction, int channel)
+/* Whether moments of a channel are wanted between its corners. */
+static inline int bp_cuts_moments(const double *reduction, int channel)
 {
-    double wanted = 0.0;
-    for (int m = 0; m < BP_MOMENTS; m++) wanted += reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + channel];
-    return wanted != 0.0;
+    int wanted = 0;
+    for (int m = 0; m < BP_MOMENTS; m++) wanted |= reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + channel] == 1.0;
+    return wanted;
 }
 
 /* Number of the most loaded ball of a channel of the balls, times 4, and on which side it is of what makes corners: contact, and the end of the
@@ -670,7 +670,7 @@ static inline void bp_reduce(double *reduction, int passes, const double v[BP_PO
 #undef BP_OF_DEGREE
     }
     for (int k = BP_NX; k < BP_LOOKED_AT; k++) {
-        if (!bp_wants_moments(reduction, k) || !bp_is_cut(step, k - BP_NX)) continue;
+        if (!bp_cuts_moments(reduction, k) || !bp_is_cut(step, k - BP_NX)) continue;
         double between[BP_MOMENTS];
         bp_moments_between(step, k - BP_NX, reduction[BP_SHIFT + k], between);
         for (int m = 0; m < BP_MOMENTS; m++) moment[m][k] = between[m];

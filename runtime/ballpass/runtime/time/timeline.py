@@ -267,7 +267,8 @@ def input_slopes(
 
 def angle_slope(info: TurningInfo, values: Values, moved: Mapping[str, float], t: float) -> float:
     """Derivative of a turning's angle at a fixed time along a direction of the values [rad/unit]."""
-    return float(np.imag(Turning.of(info, along(values, moved)).at(t)[0]) / STEP)
+    own = {name: complex(values[name], STEP * moved.get(name, 0.0)) for name in names_of(info)}
+    return float(np.imag(Turning.of(info, own).at(t)[0]) / STEP)
 
 
 def names_of(info: TurningInfo) -> tuple[str, ...]:
@@ -443,12 +444,11 @@ def breakpoint_slopes(
     keys = [*(jumps or bends)]
     slopes = np.zeros((len(keys), len(moved)))
     infos = {info.name: info for info in manifest.turnings}
-    for column, direction in enumerate(moved):
-        for row, (name, turning, parts) in enumerate(keys):
-            slopes[row, column] = direction.get(name, 0.0)
-            if turning:
-                angle, rate = Turning.of(infos[turning], along(values, direction)).times(parts).at(t)
-                slopes[row, column] = (slopes[row, column] - np.imag(angle) / STEP) / np.real(rate)
+    for row, (name, turning, parts) in enumerate(keys):
+        slopes[row] = [direction.get(name, 0.0) for direction in moved]
+        if turning:
+            turned = np.array([angle_slope(infos[turning], values, direction, t) for direction in moved])
+            slopes[row] = (slopes[row] / parts - turned) / Turning.of(infos[turning], values).at(t)[1]
     return [name for name, _, _ in keys], slopes
 
 
