@@ -286,7 +286,10 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         return (math.copysign(1.0, turning.rate[0]) * ahead % (turns * TURN)) / abs(float(turning.rate[0]))
     passed = turning.first_pass(angle, turns)
     if passed is None:
-        raise RequestError(f"crank_angle: the driver never passes {angle:.9g} rad by its table of speeds.")
+        raise RequestError(
+            f"crank_angle: the driver never passes {angle:.9g} rad by its table of speeds. Allowed: an angle on its "
+            "way; or give the instant as a time (t)."
+        )
     return passed
 
 
