@@ -578,12 +578,16 @@ static void bp_rank_cuts(bp_cuts *cuts, const bp_within *step, int row, const do
     bp_cut(cuts, at);
 }
 
+/* Tolerance of a run up to which steps are cut at the corners of the most loaded ball: at looser ones what a corner costs is of the size of
+   the run's own error, and a cut step takes twice as long.  Kinks are located from there on (run/locating.py). */
+static const double BP_CUT_BELOW = 3e-7;
+
 /* Whether moments of a channel are wanted between its corners. */
 static inline int bp_cuts_moments(const double *reduction, int channel)
 {
-    int wanted = 0;
-    for (int m = 0; m < BP_MOMENTS; m++) wanted |= reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + channel] == 1.0;
-    return wanted;
+    double wanted = 0.0;
+    for (int m = 0; m < BP_MOMENTS; m++) wanted += reduction[BP_WANTED_MOMENT + m * BP_CHANNELS + channel];
+    return wanted != 0.0 && reduction[BP_EQUAL] <= BP_CUT_BELOW;
 }
 
 /* Number of the most loaded ball of a channel of the balls, times 4, and on which side it is of what makes corners: contact, and the end of the

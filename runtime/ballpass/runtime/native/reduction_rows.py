@@ -43,9 +43,6 @@ DEFLECTION = "ball.deflection"
 #: What is wanted of it in rows that do not ask for it.
 GUARD = 0.5
 
-#: What is wanted of moments that are not cut where another ball leads, which doubles the work of such a step.
-WHOLE = 0.5
-
 
 def row_names() -> tuple[str, ...]:
     """What a row holds of every channel: first whether each extreme and each moment is wanted."""
@@ -129,15 +126,7 @@ class ReductionRows:
         """All extremes and moments of these channels, for `empty`."""
         return [(name, channel) for channel in channels for name in (*EXTREMES, *MOMENTS)]
 
-    def empty(
-        self,
-        count: int,
-        start: ArrayLike,
-        wanted: Collection[tuple[str, str]],
-        rtol: float = 0.0,
-        *,
-        cut: bool = True,
-    ) -> np.ndarray:
+    def empty(self, count: int, start: ArrayLike, wanted: Collection[tuple[str, str]], rtol: float = 0.0) -> np.ndarray:
         """Rows of reductions that count from `start` on [s], shape (count, size).
 
         Parameters
@@ -145,7 +134,6 @@ class ReductionRows:
         wanted : extremes and moments, each of a channel.  The highest deflection of the balls is always among them: it
             shows whether a bearing can be so.
         rtol : relative tolerance of the runs [1]
-        cut : whether moments of the most loaded ball are taken between its corners
         """
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")], rows[:, HEAD.index("equal")] = start, max(rtol, EQUAL)
@@ -153,7 +141,7 @@ class ReductionRows:
             if channel.endswith(DEFLECTION):
                 rows[:, self.column("max_wanted", channel)] = GUARD
         for name, channel in wanted:
-            rows[:, self.column(f"{name}_wanted", channel)] = WHOLE if name in MOMENTS and not cut else 1.0
+            rows[:, self.column(f"{name}_wanted", channel)] = 1.0
         return rows
 
 

@@ -65,7 +65,7 @@ def simulate(
     trajectory = start_trajectory(run, sampling)
     channels = reduced_channels(model.manifest, sampling.outputs)
     layout = reduction_rows(model.manifest)
-    rows = layout.empty(2, [run.start, 0.0], layout.all_of(channels), run.rtol, cut=False)
+    rows = layout.empty(2, [run.start, 0.0], layout.all_of(channels), run.rtol)
     by_stepper = run.method in STEPPERS
     reducing = by_stepper and channels and directions is None
     going: RunUnderWay | None = None

@@ -102,9 +102,9 @@ class Solution:
     status : how the simulation ended
     accuracy : target, choice and estimate, where an error was named instead of a method
     reductions : extremes, means and rms found in every step of the run, for any samples: of the states, and of
-        the most loaded ball for those outputs that are kept, whose means and rms are right to some 1e-5 (those of
-        `Model.reduce` as those of one ball).  None for other methods than the project's own stepper, beside
-        derivatives, and where no output is kept
+        the most loaded ball for those outputs that are kept (its means and rms to some 1e-5 at tolerances above 3e-7,
+        to the tolerance below).  None for other methods than the project's own stepper, beside derivatives, and
+        where no output is kept
     steady_reductions : the same from the end of the transient on
     model : that ran, for `plot`; None for a solution that was read from a file or sent by another process
 
