@@ -55,7 +55,7 @@ def test_magnitudes_in_c_and_python_are_the_same_at_the_edges(
     model = needs_stepper(make_model("punching_press"))
     values = {f"{OUTER}.mass": mass, f"{OUTER}.stiffness": stiffness}
     numbers = model.numbers(values)
-    turn = timeline.period(model.manifest, numbers.values)
+    turn = timeline.stretch(model.manifest, numbers.values)
     by_python = model_scales(model, numbers, model.initial(values), turn, turn).magnitude
     by_c = model.simulate(cycles=1, parameters=values, samples_per_cycle=16, transient=0).statistics.magnitudes
     np.testing.assert_allclose(by_c, by_python, rtol=1e-3)
@@ -76,7 +76,7 @@ def test_a_rotor_thrown_through_its_clearance_flies_straight_for_many_turns(
     solution = model.simulate(duration=10.0, parameters=numbers, transient=0, rtol=1e-9, samples_per_cycle=16)
     np.testing.assert_allclose(solution["inner.x"][-1], start + 0.5 * force * 10.0**2, rtol=1e-6)
     np.testing.assert_allclose(solution["inner.y"][-1], 7e-4 * 10.0, rtol=1e-9)
-    turn = timeline.period(model.manifest, model.numbers(numbers).values)
+    turn = timeline.stretch(model.manifest, model.numbers(numbers).values)
     by_python = model_scales(model, model.numbers(numbers), model.initial(numbers), 10.0, turn).magnitude
     np.testing.assert_allclose(solution.statistics.magnitudes, by_python, rtol=1e-3)
 
@@ -84,7 +84,7 @@ def test_a_rotor_thrown_through_its_clearance_flies_straight_for_many_turns(
 def test_a_load_that_overflows_ends_in_words_without_warnings_of_numpy(make_model: ModelMaker) -> None:
     model = make_model("punching_press")
     numbers = {"mechanism.forces.punch.force.y": 1e300}
-    turn = timeline.period(model.manifest, model.numbers().values)
+    turn = timeline.stretch(model.manifest, model.numbers().values)
     model_scales(model, model.numbers(numbers), model.initial(), turn, turn)  # warnings are errors here
     with pytest.raises(IntegrationError, match="stopped being finite"):
         needs_stepper(model).simulate(cycles=1, parameters=numbers, transient=0)

@@ -39,7 +39,7 @@ def segments_between(model: Model, numbers: Numbers, edges: np.ndarray, gates: n
 
 def edges_of(model: Model, numbers: Numbers, begin: float, end: float) -> np.ndarray:
     """Breakpoints and whole turns of a run, with its begin and end [s]."""
-    return segment_edges(model, numbers, begin, end, timeline.period(model.manifest, numbers.values))
+    return segment_edges(model, numbers, begin, end, timeline.stretch(model.manifest, numbers.values))
 
 
 def run(

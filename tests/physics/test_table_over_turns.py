@@ -105,7 +105,7 @@ def test_means_without_asking_are_those_of_whole_cycles(make_model: Callable[...
 def test_loads_of_any_drive_repeat_after_the_turns_of_a_table(make_virtual: Callable[..., Model], scene: str) -> None:
     """A motor's angle is a state: its settled runs and lives were 64 turns, no multiple of three."""
     model = make_virtual(scene, *table(ANGLES, FORCES, ", turns = 3"))
-    assert (model.explain().turns, whole_cycles(model.manifest, LEAST)) == (3, 66)
+    assert (model.explain().turns, whole_cycles(model.manifest, model.numbers().values, LEAST)) == (3, 66)
 
 
 def test_angles_beyond_the_turns_are_refused(scene_text: Callable[..., str]) -> None:

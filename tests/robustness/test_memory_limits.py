@@ -40,7 +40,7 @@ def press(tmp_path_factory: pytest.TempPathFactory) -> Model:
 
 def two_samples(run: Run) -> Sampling:
     """Both ends of a run."""
-    return Sampling(duration=run.duration, times=np.array([run.begin, run.end]), even=False, outputs=())
+    return Sampling(span=run.span, times=np.array([run.begin, run.end]), even=False, outputs=())
 
 
 def most_memory(call: Callable[[], object]) -> int:

@@ -20,7 +20,7 @@ from ballpass.runtime import Model, QuantityFunction, RequestError, SimulationEr
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.member_segments import moments, stretches
-from ballpass.runtime.many.members import Members, Span, make_members
+from ballpass.runtime.many.members import Members, Spans, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import End
@@ -294,8 +294,8 @@ def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> Non
         clearance = np.linspace(4e-6, 3e-5, count)
         members = make_members(model, {"bearing.clearance": clearance})
         numbers = [members.numbers(model, k) for k in range(count)]
-        turns = np.array([timeline.period(model.manifest, n.values) for n in numbers])
-        span = Span(durations=2 * turns, turns=turns, starts=np.zeros(count))
+        turns = np.array([timeline.stretch(model.manifest, n.values) for n in numbers])
+        span = Spans(durations=2 * turns, turns=turns, starts=np.zeros(count))
         looked_at = moments(model, members, span, np.arange(count))
         found = model.ensemble_driver.magnitudes(MemberNumbers(p=members.p, c=members.c), members.initial, *looked_at)
         expected = [
@@ -320,9 +320,9 @@ def test_loads_from_tables_run_in_ensembles(make_model: ModelMaker) -> None:
     times = next(name for name in model.parameters if "time" in name and name.endswith("2"))
     columns = {times: np.array([0.01, 0.02, 0.03]), "bearing.clearance": np.array([0.0, 1e-6, 2e-6])}
     members = make_members(model, columns)
-    turns = np.array([timeline.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
+    turns = np.array([timeline.stretch(model.manifest, members.numbers(model, k).values) for k in range(3)])
     for start in (0.0, 0.005, 0.02):
-        assert_segments_of_one(model, members, Span(durations=np.full(3, 0.1), turns=turns, starts=np.full(3, start)))
+        assert_segments_of_one(model, members, Spans(durations=np.full(3, 0.1), turns=turns, starts=np.full(3, start)))
     result = model.simulate_many(columns, ["rms:inner.x"], duration=0.1, transient=0, rtol=1e-9)
     for k in range(3):
         single = model.reduce(duration=0.1, transient=0, rtol=1e-9, parameters=member(columns, k))
@@ -357,7 +357,7 @@ def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> 
         assert np.array_equal(found[row], timeline.inputs_at(model.manifest, values, time, time + 1e-4))
 
 
-def assert_segments_of_one(model: Model, members: Members, span: Span) -> None:
+def assert_segments_of_one(model: Model, members: Members, span: Spans) -> None:
     """Segments and moments made for many members at once are the bits of those made for each by itself."""
     count, inputs = len(members), model.manifest.inputs
     parts = list(stretches(model, members, span, np.arange(count)))
@@ -408,7 +408,7 @@ def test_segments_made_for_many_are_those_made_for_one(make_model: ModelMaker, t
     columns["mechanism.driver.speed"][8:10] *= -1.0
     members = make_members(model, columns)
     length = 2.0 * math.pi / np.abs(columns["mechanism.driver.speed"])
-    assert_segments_of_one(model, members, Span(durations=turns * length, turns=length, starts=transient * length))
+    assert_segments_of_one(model, members, Spans(durations=turns * length, turns=length, starts=transient * length))
 
 
 @pytest.mark.long
@@ -420,8 +420,8 @@ def test_segments_of_fast_loads_on_slow_shafts_are_those_made_for_one(make_model
     model = make_model("varying_compliance", (LOAD, wave), ('force = ["196 N", "0 N"] ', ""))
     fast = next(name for name in model.parameters if name.endswith("frequency"))
     members = make_members(model, {fast: np.array([50.0, 1e7, 3e7])})
-    turns = np.array([timeline.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
-    span = Span(durations=2.0 * turns, turns=turns, starts=turns)
+    turns = np.array([timeline.stretch(model.manifest, members.numbers(model, k).values) for k in range(3)])
+    span = Spans(durations=2.0 * turns, turns=turns, starts=turns)
     assert_segments_of_one(model, members, span)
     (whole,) = stretches(model, members, span, np.arange(3))
     assert len(np.unique(np.diff(whole.first))) == 3
@@ -460,7 +460,7 @@ def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouch
     count = len(faults)
     members = make_members(model, {"bearing.clearance": np.linspace(0.0, 2e-5, count)})
     turns = np.full(count, model.period())
-    span = Span(durations=0.2 * turns, turns=turns, starts=np.zeros(count))
+    span = Spans(durations=0.2 * turns, turns=turns, starts=np.zeros(count))
     (good,) = stretches(model, members, span, np.arange(count))
     tolerance = 1e-6 * driver.magnitudes(good, members.initial, *moments(model, members, span, np.arange(count)))
 

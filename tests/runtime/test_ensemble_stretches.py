@@ -20,7 +20,7 @@ from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.many import chunks, member_segments
 from ballpass.runtime.many.chunks import PATIENCE
 from ballpass.runtime.many.member_segments import moments, stretches
-from ballpass.runtime.many.members import Span, make_members
+from ballpass.runtime.many.members import Spans, make_members
 from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import Kinks
@@ -61,7 +61,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
     speed = 52.36 * random.uniform(0.8, 1.2, count)
     members = make_members(model, {"bearing.clearance": clearance, SPEED: speed})
     turns = 2.0 * math.pi / speed
-    span = Span(durations=2.0 * turns, turns=turns, starts=0.3 * turns)
+    span = Spans(durations=2.0 * turns, turns=turns, starts=0.3 * turns)
     (whole,) = stretches(model, members, span, np.arange(count))
     driver = model.ensemble_driver
     tolerance = 1e-6 * driver.magnitudes(whole, members.initial, *moments(model, members, span, np.arange(count)))

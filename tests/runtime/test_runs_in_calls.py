@@ -39,7 +39,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     """Two turns in calls of so many steps, every other one in another thread: what the driver tells at the end; state,
     reductions and samples; number of calls."""
     numbers = model.numbers()
-    turn = timeline.period(model.manifest, numbers.values)
+    turn = timeline.stretch(model.manifest, numbers.values)
     state = np.array([numbers.values[name] for name in model.manifest.initial])
     tolerance = 1e-6 * stepper_magnitudes(model, model.ensemble_driver.stepper, numbers, state, 2.0 * turn, turn)
     segments = make_segments(model.manifest, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))
@@ -105,7 +105,7 @@ def test_states_of_kept_steps_are_the_samples_of_the_run_to_the_bit(
     edges = segments_of(run).times
     times = np.unique([*np.linspace(run.begin, run.end, 997), *edges])
     sampled = np.empty((len(times), len(model.states)))
-    near = time_resolution(run.begin, run.end, run.turn)
+    near = time_resolution(run.begin, run.end, run.stretch)
     start_run(run, [Samples(times=times, x=sampled, near=near, end=run.end)]).go_on()
     kept = KeptSteps(numbers=stepper.kept)
     start_run(run, [kept]).go_on()

@@ -39,7 +39,6 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, sensitivities
 from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import simulate
-from ballpass.runtime.run.start import Start
 from ballpass.runtime.run.stream import stream_run
 from ballpass.runtime.show.progress import Progress, shown
 
@@ -167,9 +166,13 @@ class Model(PointModel, Questions):
             self._assembled = checked
         return numbers
 
-    def _start(self, numbers: Numbers, initial: Initial) -> Start:
-        """Start of a run; RequestError for an unknown word."""
-        return start_of(self, numbers, initial)
+    def _asked(
+        self, parameters: Mapping[str, float] | None, initial: Initial, transient: float | None, **given: Any
+    ) -> tuple[Numbers, Request]:
+        """Numbers of a run, and its request; RequestError for an unknown word in the place of a start."""
+        numbers = self._runnable(parameters)
+        start = start_of(self, numbers, initial)
+        return numbers, Request(initial=start, transient_cycles=transient, **given)
 
     def simulate(
         self,
@@ -237,8 +240,10 @@ class Model(PointModel, Questions):
         >>> model.simulate(duration=0.05, sample_rate=10e3, outputs=[]).t[:3]  # [s]
         array([0.    , 0.0001, 0.0002])
         """
-        numbers = self._runnable(parameters)
-        request = Request(
+        numbers, request = self._asked(
+            parameters,
+            initial,
+            transient,
             cycles=cycles,
             duration=duration,
             method=method,
@@ -247,8 +252,6 @@ class Model(PointModel, Questions):
             times=times,
             sample_rate=sample_rate,
             outputs=outputs,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
             kinks=kinks,
         )
         refuse_with_error(error, method=method, rtol=rtol, kinks=kinks)
@@ -298,16 +301,16 @@ class Model(PointModel, Questions):
         >>> load_solution("press.nc")["inner.y"].shape  # [m]
         (9601,)
         """
-        numbers = self._runnable(parameters)
-        request = Request(
+        numbers, request = self._asked(
+            parameters,
+            initial,
+            transient,
             cycles=cycles,
             duration=duration,
             method=method,
             rtol=rtol,
             sample_rate=sample_rate,
             outputs=outputs,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
             kinks=kinks,
         )
         with shown("simulating", progress) as tell:
@@ -356,8 +359,10 @@ class Model(PointModel, Questions):
         >>> slopes["inner.y", "bearing.clearance"].shape  # [m/m]
         (1001,)
         """
-        numbers = self._runnable(parameters)
-        request = Request(
+        numbers, request = self._asked(
+            parameters,
+            None,
+            None,
             cycles=cycles,
             duration=duration,
             method=method,
@@ -402,15 +407,8 @@ class Model(PointModel, Questions):
         >>> f"{work.value:.3f} {work.unit}, ball {force.ball}"
         '9.078 J, ball 3'
         """
-        numbers = self._runnable(parameters)
-        request = Request(
-            cycles=cycles,
-            duration=duration,
-            method=method,
-            rtol=rtol,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
-            kinks=kinks,
+        numbers, request = self._asked(
+            parameters, initial, transient, cycles=cycles, duration=duration, method=method, rtol=rtol, kinks=kinks
         )
         with shown("simulating", progress) as tell:
             return quantity_values(self, numbers, replace(request, progress=tell), [of] if isinstance(of, str) else of)
@@ -445,14 +443,7 @@ class Model(PointModel, Questions):
         >>> found["mechanism.forces.punch.window.start"].round(4)  # [s]
         array([0.079, 0.199])
         """
-        numbers = self._runnable(parameters)
-        request = Request(
-            cycles=cycles,
-            duration=duration,
-            rtol=rtol,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
-        )
+        numbers, request = self._asked(parameters, initial, transient, cycles=cycles, duration=duration, rtol=rtol)
         with shown("simulating", progress) as tell:
             return passing_times(self, numbers, replace(request, progress=tell))
 
@@ -488,15 +479,8 @@ class Model(PointModel, Questions):
         >>> round(found.maximum, -1), round(found.rms, -1)  # [N]
         (4400.0, 690.0)
         """
-        numbers = self._runnable(parameters)
-        request = Request(
-            cycles=cycles,
-            duration=duration,
-            method=method,
-            rtol=rtol,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
-            kinks=kinks,
+        numbers, request = self._asked(
+            parameters, initial, transient, cycles=cycles, duration=duration, method=method, rtol=rtol, kinks=kinks
         )
         with shown("simulating", progress) as tell:
             return reduce_run(self, numbers, replace(request, progress=tell))
@@ -536,14 +520,7 @@ class Model(PointModel, Questions):
         >>> round(found.reductions["ball.force"].maximum, -1)  # [N]
         4400.0
         """
-        numbers = self._runnable(parameters)
-        request = Request(
-            method=method,
-            rtol=rtol,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
-            kinks=kinks,
-        )
+        numbers, request = self._asked(parameters, initial, transient, method=method, rtol=rtol, kinks=kinks)
         with shown("simulating until settled", progress) as tell:
             return settle(self, numbers, replace(request, progress=tell), most)
 
@@ -664,14 +641,7 @@ class Model(PointModel, Questions):
         >>> found.uncertain, found.worst < 1e-3
         ((), True)
         """
-        numbers = self._runnable(parameters)
-        request = Request(
-            cycles=cycles,
-            duration=duration,
-            rtol=rtol,
-            initial=self._start(numbers, initial),
-            transient_cycles=transient,
-        )
+        numbers, request = self._asked(parameters, initial, transient, cycles=cycles, duration=duration, rtol=rtol)
         with shown("simulating from two starts", progress) as tell:
             names = dict.fromkeys([of] if isinstance(of, str) else of or ())
             return find_growth(self, numbers, replace(request, progress=tell), of=tuple(names))

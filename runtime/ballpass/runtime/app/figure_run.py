@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 from ballpass.runtime.quantity.characteristic import turns_to_separate
 from ballpass.runtime.run.settle import repeats
+from ballpass.runtime.time.timeline import driver
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -40,7 +41,8 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         return None
     done = (solution.t[-1] - statistics.begin) / length
     numbers = {**solution.parameters, **solution.constants}
-    if not repeats(model, numbers, solution.transient_cycles * length):
+    turning = driver(model.manifest, numbers)
+    if not repeats(model, numbers, turning.after(solution.transient_cycles)):
         return None
     turns = turns_to_separate(solution.manifest, numbers)
     if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
@@ -55,5 +57,5 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         kinks=cast("Kinks | None", statistics.kinks),
         outputs=[name for name in wanted if name not in solution.states],
         initial=solution.end,
-        transient=solution.t[-1] / length + SETTLE,
+        transient=turning.turns(0.0, float(solution.t[-1])) + SETTLE,
     )

@@ -41,6 +41,7 @@ from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.failure_location import ring_distances
 from ballpass.runtime.run.settle import MEANS, PEAKS
+from ballpass.runtime.time.timeline import cycle_turns
 from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
@@ -265,17 +266,19 @@ def _forces(model: Model, sol: Solution, peaks: Mapping[tuple[str, Kind], Peak])
 def _drive_work(model: Model, sol: Solution) -> float | None:
     """Work of the drive in a turn [J]: the quantity, where the output follows from time or from steps.
 
-    None where the driver's speed changes, or makes no whole turn.
+    None where a torque drives, or the driver makes no whole turn.
     """
     mechanism, numbers = sol.manifest.mechanism, model.numbers(sol.parameters)
-    if mechanism is None or sol.period is None:
+    if mechanism is None or mechanism.angle:
         return None
     run = run_of(model, numbers, sol)
-    window = whole_cycles(run)
+    window = whole_cycles(run.span, cycle_turns(sol.manifest, numbers.values))
     if window is None:
         return None
     if has_quantities(sol, "drive_torque", model):
         return float(QuantityRun(model, quantities_of(model, ["drive_work"])).measure(run).values[0])
+    if sol.period is None:
+        return None
     begin, end = np.searchsorted(sol.t, np.array(window) + 1e-9 * sol.period * np.array([-1.0, 1.0]))
     torque = statistics(sol.t[begin:end], sol["drive_torque"][begin:end])
     return math.copysign(TURN, sol.parameters[mechanism.speed]) * torque.mean

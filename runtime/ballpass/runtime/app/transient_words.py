@@ -54,13 +54,13 @@ def warnings_of_transient(
 
 def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
     """A sentence where turns that a scene without a run takes lie behind rows of tables, or are no load's period."""
-    settings, turn = model.run_settings, timeline.period(model.manifest, values)
-    if settings.stated or settings.cycles is None or not math.isfinite(turn):
+    settings, turning = model.run_settings, timeline.driver(model.manifest, values)
+    if settings.stated or settings.cycles is None or turning.fastest == 0.0:
         return []
-    begin = settings.transient_cycles * turn
+    begin, end = turning.after(settings.transient_cycles), turning.after(settings.cycles)
     changes = timeline.changes_over_time(model.manifest, values, 0.0, begin)
     rows = timeline.rows_over_time(model.manifest, values, 0.0, begin if changes else 0.0)
-    slowest, length = timeline.longest_harmonic(model.manifest, values), settings.cycles * turn - begin
+    slowest, length = timeline.longest_harmonic(model.manifest, values), end - begin
     if not len(rows) and slowest > length * (1.0 + 1e-9):
         return [
             f"turns {settings.transient_cycles:g} to {settings.cycles:g}, which a scene without a run takes, are "
@@ -91,7 +91,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     """
     words = [*_part_of_cycle(run), *_part_of_beats(run, longer)]
     if longer is not None and longer.first:
-        return [_start_words(model, longer), *words]
+        return [_start_words(run, longer), *words]
     if asked or longer is None or model.manifest.run.stated:
         return words
     found = still_changes(run)
@@ -103,8 +103,8 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
     first = ", ".join(f"{name} by {rounded(100.0 * found.changes[name], 2)} %" for name in names[:SHOWN])
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return [
-        f"turns {run.transient_cycles:g} to {run.end / run.turn:g}, which a scene without a run takes, have not "
-        f"forgotten their start: one moved by {found.moved:g} of the motion still changes "
+        f"turns {run.span.transient:g} to {run.span.transient + run.span.counted:g}, which a scene without a run "
+        f"takes, have not forgotten their start: one moved by {found.moved:g} of the motion still changes "
         f"{first}{more}. Give a run with a longer "
         "transient (--cycles, --transient), or let it be found (ballpass run --turns settle).",
         *words,
@@ -113,8 +113,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
 
 def _part_of_cycle(run: Run) -> list[str]:
     """A warning about means of a run that ends within the turns after which all loads repeat."""
-    cycle = cycle_turns(run.model.manifest)
-    turns = (run.end - run.start) / run.turn
+    cycle, turns = cycle_turns(run.model.manifest, run.numbers.values), run.span.counted
     if cycle == 1 or math.isclose(turns, cycle * round(turns / cycle), rel_tol=1e-9):
         return []
     return [
@@ -132,8 +131,9 @@ def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
         The run that is half a beat further on failed.
     """
     model, values, words = run.model, run.numbers.values, []
-    turns = max((run.end - run.start) / run.turn, 0.0 if longer is None else longer.turns)
-    slow = [one for one in beats(model.manifest, values) if one.period > turns * run.turn]
+    turns = max(run.span.counted, 0.0 if longer is None else longer.turns)
+    turn = run.span.turning.turn
+    slow = [one for one in beats(model.manifest, values) if one.period > turns * turn]
     if not slow or not repeats(model, values, run.start):
         return []
     here, noise = reduced(run), tolerated(run)
@@ -144,27 +144,27 @@ def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
         peak, mean = changes[name]
         if peak <= PEAKS and mean <= MEANS:
             continue
-        needed = math.ceil(beat.period / run.turn)
+        needed = math.ceil(beat.period / turn)
         words.append(
-            f"{beat.words} beats once in {beat.period:.4g} s, {rounded(beat.period / run.turn)} turns, of which the "
+            f"{beat.words} beats once in {beat.period:.4g} s, {rounded(beat.period / turn)} turns, of which the "
             f"run has {turns:g}: half a beat later extremes of {name} change by {rounded(100.0 * peak, 2)} % of their "
             f"range and its rms by {rounded(100.0 * mean, 2)} %. Numbers are those of a part of the beat; all of it "
-            f"takes --cycles {math.ceil(run.transient_cycles) + needed} --transient {run.transient_cycles:g}."
+            f"takes --cycles {math.ceil(run.span.transient) + needed} --transient {run.span.transient:g}."
         )
     return words
 
 
-def _start_words(model: Model, longer: Settled) -> str:
+def _start_words(run: Run, longer: Settled) -> str:
     """A warning about extremes of the first turns, which later ones do not come near."""
     # forces first: they are what is designed by
     names = sorted(longer.first, key=lambda name: "ball." not in name)
     kind, time, value, later = longer.first[names[0]]
-    _, unit = channels_of(model.manifest)[names[0]]
+    manifest, turning = run.model.manifest, run.span.turning
+    _, unit = channels_of(manifest)[names[0]]
     factor, shown = table_unit(unit)
-    length = longer.reductions.cycle_length
-    turn = "" if length is None else f", in turn {int(time / length) + 1}"
+    turn = f", in turn {int(turning.turns(0.0, time)) + 1}" if turning.fastest else ""
     more = f", and {len(names) - 1} more" if len(names) > 1 else ""
-    words = inside(row_words(model.manifest, names[0]))
+    words = inside(row_words(manifest, names[0]))
     return (
         f"extremes of the start, not of the steady machine: {words} ({names[0]}) has its {kind} of "
         f"{factor * value:.4g} {shown} at {time:.4g} s{turn}, and later turns have {factor * later:.4g} {shown}{more}. "

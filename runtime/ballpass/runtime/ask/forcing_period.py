@@ -235,7 +235,7 @@ def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.n
             continue
         info = timeline.info_of(model.manifest, item)
         if _rate(info, numbers.values) != 0.0 and _matters(model, numbers, times, states, k, item):
-            turns = item.turns if item.turns > 1 else 1
+            turns = timeline.repeats_after(item, numbers.values) if item.turns > 1 else 1
             parts = Fraction(1, turns) if turns > 1 else Fraction(info.parts)
             known = found.get(info, parts)
             found[info] = Fraction(1, math.lcm(known.denominator, turns)) if known.denominator * turns > 1 else known

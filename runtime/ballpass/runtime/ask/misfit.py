@@ -239,7 +239,7 @@ class Misfit:
         if len(trial.t):
             # of one length for all shifts, so that its steps are the same
             length = self._begin + float(trial.t[-1]) + self._after
-            run = resolve(model, numbers, Request(rtol=self._rtol, transient_cycles=0.0), duration=length)
+            run = resolve(model, numbers, Request(duration=length, transient_cycles=0.0, rtol=self._rtol))
         else:
             asked = Request(cycles=self._cycles, transient_cycles=self._transient, rtol=self._rtol)
             run = resolve(model, numbers, asked).check_steady()

@@ -29,6 +29,7 @@ from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.span import Span
 
 Kind = Literal["max", "min"]
 
@@ -122,12 +123,13 @@ def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
     return Run(
         model=model,
         numbers=numbers,
-        begin=statistics.begin,
-        end=float(solution.t[-1]),
-        turn=timeline.period(model.manifest, numbers.values),
-        turns=None,
-        transient_cycles=0.0,
-        start=float(solution.t[0]),
+        span=Span(
+            turning=timeline.driver(model.manifest, numbers.values),
+            begin=statistics.begin,
+            start=float(solution.t[0]),
+            end=float(solution.t[-1]),
+            transient=0.0,
+        ),
         initial=np.array(statistics.initial),
         method=statistics.method if statistics.method in STEPPERS else "stepper",
         rtol=statistics.rtol,

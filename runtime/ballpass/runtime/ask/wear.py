@@ -89,13 +89,13 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
     """
     model, numbers, manifest = run.model, run.numbers, run.model.manifest
     steady = run.end - run.start
-    turns = steady / run.turn if turns is None else turns
+    turns = run.span.counted if turns is None else turns
     # odd: in any whole number of turns two samples differ in the driver's angle, also where a turn has few of them
     whole = turns or 1.0
     several = max(manifest.run.samples_per_cycle * min(whole, SAMPLED_TURNS), LEAST_IN_TURN * whole)
     count = 2 * max(round(several) // 2, 2) + 1  # of turns that rounding makes a little less as well
     time = run.start + steady * np.arange(count) / count
-    near = time_resolution(run.begin, run.end, run.turn)
+    near = time_resolution(run.begin, run.end, run.stretch)
     samples = Samples(times=time, x=np.empty((count, len(model.states))), near=near, end=run.end)
     start_run(run, [samples]).go_on()
     states = samples.x

@@ -18,8 +18,8 @@ from ballpass.runtime.run.choose_method import STIFF_RATIO, differentiating_meth
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import Request, run_length
-from ballpass.runtime.run.resolve import SCALED_TURNS, Run, resolve
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import SCALED_TURNS, Run, asked_span, resolve
 from ballpass.runtime.run.segments import check_count
 from ballpass.runtime.run.sensitivity import loosened
 from ballpass.runtime.run.start import start_state
@@ -41,13 +41,13 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
     asked = differentiating_method("sensitivity", request.method or "auto")
     fine = "stepper-dop853"
     if model.states:
-        turn = timeline.period(model.manifest, numbers.values)
-        looked_at = min(run_length(model, request, turn), SCALED_TURNS * turn)
+        turn = timeline.stretch(model.manifest, numbers.values)
+        looked_at = min(asked_span(model, numbers, request).duration, SCALED_TURNS * turn)
         scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
     method = fine if asked == "auto" else asked
     run = resolve(model, numbers, replace(request, method=method, kinks=None))
-    check_count(model.manifest, numbers, run.duration, run.turn)  # before any long computation
+    check_count(model.manifest, numbers, run.duration, run.stretch)  # before any long computation
     return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
 
 

@@ -110,7 +110,7 @@ def simulate_to_error(
     refuse_still("error", integrated=model.manifest.integrated)
     quantities = compared_quantities(model, of)
     run = stepper_run(model, numbers, request)
-    check_count(model.manifest, numbers, run.duration, run.turn)  # before a search that may take long
+    check_count(model.manifest, numbers, run.duration, run.stretch)  # before a search that may take long
     found = meet_target(run, target, quantities)
     solution = simulate(model, numbers, replace(request, method=found.method, rtol=found.rtol, kinks=found.kinks))
     return replace(

@@ -84,5 +84,5 @@ def motion_of(run: Run, values: EvaluatedQuantities) -> np.ndarray:
     layout = reduction_rows(run.model.manifest)
     assert values.row is not None  # `QuantityRun` with `motion`
     assert values.end is not None
-    extremes = [values.row[layout.column(kind, name)] for kind in ("max", "min") for name in run.model.states]
+    extremes = [values.row[layout.columns[kind, name]] for kind in ("max", "min") for name in run.model.states]
     return np.asarray(np.concatenate([extremes, values.end]) / np.tile(run.magnitude, 3))

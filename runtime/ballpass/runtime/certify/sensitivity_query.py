@@ -247,7 +247,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         settings={
             "cycles": query.request.cycles,
             "duration": run.duration,
-            "transient_cycles": run.transient_cycles,
+            "transient_cycles": run.span.transient,
             "method": run.method,
             "kinks": run.kinks,
             "rtol": query.rtol,
@@ -280,7 +280,7 @@ def _difference_scales(run: Run, names: Sequence[str]) -> Array:
         if name in at_start:
             value = max(value, START_SHARE * at_start[name])
         elif units[name] == ANGLE:
-            value = min(1.0, TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
+            value = min(1.0, TURN * run.span.cycles) or 1.0
         elif value == 0.0:
             alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
             value = position if units[name] == "m" else max(alike, default=0.0)

@@ -156,8 +156,8 @@ def measure_simplification(
                 neighbour(simpler, base, {**base.parameters, **varied}),
             )
             runs = [stepper_run(model, numbers[0], Request())]
-            cycles = runs[0].cycles
-            length = Request(duration=runs[0].duration, transient_cycles=runs[0].start / runs[0].turn)
+            cycles = runs[0].span.cycles or 1.0
+            length = Request(duration=runs[0].duration, transient_cycles=runs[0].span.transient)
             runs.append(stepper_run(simpler, numbers[1], length))
             for k, run in enumerate(runs):
                 values[k, member], doubt[k, member] = reference(run, quantities[k])

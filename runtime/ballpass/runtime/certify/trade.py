@@ -145,7 +145,7 @@ def measure_trade(
     with shown("measuring", progress) as tell:
         for member, numbers in enumerate(perturbed(model, around, members, spread)):
             run = stepper_run(model, neighbour(model, user, numbers), Request())
-            turns = run.cycles
+            turns = run.span.cycles or 1.0
             true[member], doubt[member] = reference(run, quantities)
             for k in order.permutation(len(ways)):
                 try:

@@ -41,8 +41,9 @@ def find_transient(model: LoadedModel) -> RunInfo:
     numbers = model.numbers()
     if given.cycles is None or not (model.has_stepper and model.states):
         return given
-    turn = timeline.period(model.manifest, numbers.values)
-    if not repeats(model, numbers.values, given.transient_cycles * turn):
+    if not repeats(
+        model, numbers.values, timeline.driver(model.manifest, numbers.values).after(given.transient_cycles)
+    ):
         return given
     transient, length, left = given.transient_cycles, given.cycles - given.transient_cycles, SEARCH
     try:

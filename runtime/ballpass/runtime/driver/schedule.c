@@ -199,6 +199,36 @@ static void add_within(time_list *list, const piece *p, double parts, double edg
     }
 }
 
+/* Where a piece turns back; its begin where it does not. */
+static double turning_back(const piece *p)
+{
+    const double back = p->begin.v - 0.5 * p->rate.v / p->half.v;
+    return p->half.v != 0.0 && p->begin.v < back && back < p->end ? back : p->begin.v;
+}
+
+double schedule_turns(const schedule_turning *turning, const double *values, double most, double *end)
+{
+    double made = 0.0;
+    piece p = {.end = 0.0};
+    for (int more = next_piece(turning, values, NULL, 1, &p); more && p.begin.v < *end; more = next_piece(turning, values, NULL, 0, &p)) {
+        const double parts[] = {p.begin.v, turning_back(&p), p.end < *end ? p.end : *end};
+        for (int k = 0; k < 2; k++) {
+            const double left = parts[k], right = parts[k + 1];
+            if (right <= left) continue;
+            const double rate = rate_of(&p, left).v, half = p.half.v, length = right - left;
+            const double middle = isfinite(length) ? rate + half * length : rate;
+            const double sense = copysign(1.0, middle), passed = middle == 0.0 ? 0.0 : fabs(middle) * length / TURN;
+            if (made + passed >= most) {
+                const double ahead = sense * TURN * (most - made), square = rate * rate + 4.0 * half * ahead;
+                *end = left + (ahead == 0.0 ? 0.0 : 2.0 * ahead / (rate + sense * sqrt(square > 0.0 ? square : 0.0)));
+                return most;
+            }
+            made += passed;
+        }
+    }
+    return made;
+}
+
 /* Times in [begin, end] at which it does so. */
 static void add_passages(time_list *list, const schedule_turning *turning, const double *values, double parts, double edge, double period,
                          double begin, double end)
@@ -206,9 +236,9 @@ static void add_passages(time_list *list, const schedule_turning *turning, const
     piece p = {.end = 0.0};
     double from = begin;
     for (int more = next_piece(turning, values, NULL, 1, &p); more && from < end; more = next_piece(turning, values, NULL, 0, &p)) {
-        const double to = p.end < end ? p.end : end, back = p.begin.v - 0.5 * p.rate.v / p.half.v;
+        const double to = p.end < end ? p.end : end, back = turning_back(&p);
         if (to <= from) continue;
-        const int split = p.half.v != 0.0 && from < back && back < to && back > p.begin.v;
+        const int split = from < back && back < to;
         add_within(list, &p, parts, edge, period, from, split ? back : to);
         if (split) add_within(list, &p, parts, edge, period, back, to);
         from = to;

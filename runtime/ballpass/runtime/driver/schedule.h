@@ -49,6 +49,9 @@ typedef struct {
 /* Angle of a turning at a time [rad], and its rate [rad/s]; each may be NULL. */
 void schedule_angle(const schedule_turning *turning, const double *values, double t, double *angle, double *rate);
 
+/* Turns that a turning makes from t = 0 until `end`, in either sense; where it makes so many as `most` before, `end` becomes that time. */
+double schedule_turns(const schedule_turning *turning, const double *values, double most, double *end);
+
 /* The most segments that a run may have, counted before any is made.
 
    length, turn    of the run and of a turn [s]; the turn may be infinite */

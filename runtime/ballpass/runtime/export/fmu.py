@@ -50,7 +50,7 @@ from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.time.timeline import period
+from ballpass.runtime.time.timeline import stretch
 
 #: C of the interface, the standard's headers, and the licence of both.
 FMI = DRIVER / "fmi"
@@ -187,7 +187,7 @@ def _magnitudes(model: LoadedModel) -> list[float]:
     numbers = model.numbers()
     initial = np.array([numbers.values[name] for name in model.manifest.initial])
     duration, _ = experiment(model.manifest)
-    scales = model_scales(model, numbers, initial, duration, period(model.manifest, numbers.values))
+    scales = model_scales(model, numbers, initial, duration, stretch(model.manifest, numbers.values))
     return [float(size) for size in scales.magnitude]
 
 

@@ -19,7 +19,7 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies
 from ballpass.runtime.export.scene_numbers import computed_outputs, speed_table, varying
-from ballpass.runtime.time.timeline import period
+from ballpass.runtime.time.timeline import driver, stretch
 
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"
@@ -114,8 +114,9 @@ def _rate_unit(unit: str) -> str:
 
 def experiment(manifest: Manifest) -> tuple[float, float]:
     """Length of the scene's run, and time between its samples [s]."""
-    run, turn = manifest.run, period(manifest, {info.name: info.default for info in manifest.parameters})
-    duration = run.duration if run.cycles is None else run.cycles * turn
+    values = {info.name: info.default for info in manifest.parameters}
+    run, turn = manifest.run, stretch(manifest, values)
+    duration = run.duration if run.cycles is None else driver(manifest, values).after(run.cycles)
     if duration is None or not math.isfinite(duration):
         return 1.0, 1.0 / run.samples_per_cycle
     return duration, (turn if math.isfinite(turn) else duration) / run.samples_per_cycle

@@ -18,7 +18,7 @@ import numpy as np
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many.member_segments import moments, stretches
-from ballpass.runtime.many.members import Members, Span
+from ballpass.runtime.many.members import Members, Spans
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import is_void, void_moment
@@ -27,6 +27,8 @@ from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.locating import Kinks
 from ballpass.runtime.run.loop import STATUS_OF_END, ReductionRow, RunFailed, RunUnderWay
 from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.time.span import Span
+from ballpass.runtime.time.timeline import driver
 
 #: Most members of a chunk: so many that lanes that are empty at its end cost little.
 CHUNK = 128
@@ -87,7 +89,7 @@ class Work:
     model: LoadedModel
     driver: EnsembleDriver | None
     members: Members
-    span: Span
+    span: Spans
     method: str
     rtol: float
     kinks: Kinks
@@ -187,16 +189,13 @@ def member_run(work: Work, member: int, magnitude: np.ndarray | None = None) -> 
     ----------
     magnitude : of the states, where it is known, shape (states,)
     """
-    duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
+    duration, start = float(work.span.durations[member]), float(work.span.starts[member])
+    numbers = work.members.numbers(work.model, member)
+    turning = driver(work.model.manifest, numbers.values)
     return Run(
         model=work.model,
-        numbers=work.members.numbers(work.model, member),
-        begin=0.0,
-        end=duration,
-        turn=turn,
-        turns=None,
-        transient_cycles=start / turn,
-        start=start,
+        numbers=numbers,
+        span=Span(turning=turning, begin=0.0, start=start, end=duration, transient=turning.turns(0.0, start)),
         initial=work.members.initial[member],
         method=work.method,
         rtol=work.rtol,

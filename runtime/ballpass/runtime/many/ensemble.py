@@ -10,6 +10,7 @@ the results are the same bits for any number of threads.
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import threading
 import time as clocks
@@ -26,7 +27,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, unknown_name, whole
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
-from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
+from ballpass.runtime.many.members import Members, Spans, Table, make_members, read_table
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
@@ -39,10 +40,10 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.choose_method import choose_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.loop import RunFailed
-from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, asked_length, check_memory
+from ballpass.runtime.run.request import asked_length, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
-from ballpass.runtime.run.resolve import check_span, check_transient
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.span import MOST_TIME, MOST_TURNS, Span, check_transient
 from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
@@ -247,7 +248,7 @@ def simulate_many(
         driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns)
     skipped = model.run_settings.transient_cycles if transient is None else real(transient)
-    span = _span(model, members, cycles, duration, skipped)
+    span = _spans(model, members, cycles, duration, skipped)
     in_lanes = driver is not None and lanes and at_kinks != LOCATED
     by_steps = [item for item in chosen if is_reduced(model, item)]
     others = [item for item in chosen if not is_reduced(model, item)]
@@ -334,30 +335,34 @@ def _threads(given: int | None) -> int:
     return whole("threads", given)
 
 
-def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
+def _spans(
+    model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float
+) -> Spans:
     """Lengths of the members' runs; members for which there is none are refused."""
     cycles, duration = asked_length(model, cycles, duration)
     check_transient(transient)
-    count = len(members)
-    name = timeline.speed_name(model.manifest)
+    count, manifest = len(members), model.manifest
+    name, info = timeline.speed_name(manifest), timeline.driver_info(manifest)
     speeds = np.zeros(count) if name is None else np.abs(members.columns[name])
     turns = np.divide(TURN, speeds, out=np.full(count, np.inf), where=speeds > 0.0)
     durations = np.full(count, duration) if duration is not None else (cycles or 0.0) * turns
     starts = transient * turns if transient > 0.0 else np.zeros(count)
-    # the rules of `check_span`, for all members at once
-    longest = np.minimum(MOST_TIME, MOST_TURNS * turns)
-    able = (starts < durations * (1.0 - 1e-9)) & (durations <= longest)
+    # the rules of `Span`, for all members at once
+    able = (starts < durations * (1.0 - 1e-9)) & (durations <= np.minimum(MOST_TIME, MOST_TURNS * turns))
+    tables = info is not None and info.times != ()
+    able &= not tables  # each by its own rows
     for member in np.flatnonzero(~able).tolist():
         try:
-            if duration is None and not np.isfinite(turns[member]):
-                raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
-            check_span(float(durations[member]), float(turns[member]), transient)
+            turning = timeline.driver(manifest, {name: column[member] for name, column in members.columns.items()})
+            given = math.nan if duration is None else duration
+            span = Span.of(turning, cycles=cycles, duration=given, transient=transient).check()
+            durations[member], starts[member] = span.end, span.start
         except RequestError as fault:
-            if np.all(turns == turns[member]):  # and so with every other one
+            if not tables and np.all(turns == turns[member]):  # and so with every other one
                 raise
             members.refused[member] = str(fault)
             durations[member] = starts[member] = 0.0
-    return Span(durations=durations, turns=turns, starts=starts)
+    return Spans(durations=durations, turns=turns, starts=starts)
 
 
 def measure_members(

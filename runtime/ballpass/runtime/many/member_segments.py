@@ -11,7 +11,7 @@ from itertools import count
 
 import numpy as np
 
-from ballpass.runtime.many.members import Members, Span
+from ballpass.runtime.many.members import Members, Spans
 from ballpass.runtime.native.ensemble_driver import MemberArrays
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.request import check_memory
@@ -27,7 +27,7 @@ MEMBER_WINDOWS = 128
 SEGMENTS = 65_536
 
 
-def stretches(model: LoadedModel, members: Members, span: Span, which: np.ndarray) -> Iterator[MemberArrays]:
+def stretches(model: LoadedModel, members: Members, span: Spans, which: np.ndarray) -> Iterator[MemberArrays]:
     """Segments of some members, a stretch of their runs after the other; memory does not grow with the runs.
 
     A member whose run is over has no segments in later stretches.
@@ -69,7 +69,7 @@ def stretches(model: LoadedModel, members: Members, span: Span, which: np.ndarra
 
 
 def moments(
-    model: LoadedModel, members: Members, span: Span, which: np.ndarray
+    model: LoadedModel, members: Members, span: Spans, which: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The moments that `ballpass.runtime.run.magnitudes` uses, as for a single run with reductions.
 

@@ -1,6 +1,6 @@
 """Members of an ensemble: a table of parameters read, checked, and completed by derived constants.
 
-In: a table of parameters.  Out: `Members`, the `Span` of their runs, and the edges of one run's segments.
+In: a table of parameters.  Out: `Members`, the `Spans` of their runs, and the edges of one run's segments.
 """
 
 from __future__ import annotations
@@ -226,13 +226,13 @@ def groups(rows: np.ndarray) -> list[np.ndarray]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Span:
+class Spans:
     """How long each member runs.
 
     Attributes
     ----------
     durations : shape (members,) [s]
-    turns : time of a turn, infinite when nothing turns, shape (members,) [s]
+    turns : time after which each is cut, see `timeline.stretch`, shape (members,) [s]
     starts : time from which the reductions count, shape (members,) [s]
     """
 

@@ -32,6 +32,7 @@ from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.run.sensor import Sensor
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.span import Span
 
 #: Ways to store samples.
 PRECISIONS = ("float32", "float64")
@@ -233,12 +234,9 @@ def _entries(
 
 def _recorded(model: LoadedModel, numbers: Numbers, signals: Signals) -> Run:
     """The recorded part of a run, which takes the steps of the one with samples."""
-    turn = timeline.period(model.manifest, numbers.values)
-    request = Request(rtol=signals.rtol, transient_cycles=signals.transient / turn)
-    run = resolve(model, numbers, request, duration=float(signals.times[-1]))
-    if not math.isfinite(turn):
-        run = replace(run, start=signals.transient)
-    return run
+    turning = timeline.driver(model.manifest, numbers.values)
+    span = Span.of(turning, duration=float(signals.times[-1]), transient=turning.turns(0.0, signals.transient))
+    return resolve(model, numbers, Request(rtol=signals.rtol), span=replace(span, start=signals.transient))
 
 
 def check_outputs(manifest: Manifest, signals: Signals, label: str, model: LoadedModel | None = None) -> None:

@@ -87,7 +87,8 @@ class ReductionRows:
         return (*self.states, *self.balls, *self.turned)
 
     @cached_property
-    def _columns(self) -> dict[tuple[str, str], int]:
+    def columns(self) -> dict[tuple[str, str], int]:
+        """Place of each entry of `ROWS` in a row, by kind and channel."""
         named = ((kind, channel) for kind in ROWS for channel in self.channels)
         return {entry: len(HEAD) + place for place, entry in enumerate(named)}
 
@@ -118,10 +119,6 @@ class ReductionRows:
         """Place in a row of the first place of a bearing's outer raceway; all others follow."""
         return self._sectors + 2 * SECTORS * self.turned.index(prefix + TURNED)
 
-    def column(self, kind: str, channel: str) -> int:
-        """Place of an entry of `ROWS` in a row."""
-        return self._columns[kind, channel]
-
     def all_of(self, channels: Iterable[str]) -> list[tuple[str, str]]:
         """All extremes and moments of these channels, for `empty`."""
         return [(name, channel) for channel in channels for name in (*EXTREMES, *MOMENTS)]
@@ -139,9 +136,9 @@ class ReductionRows:
         rows[:, HEAD.index("from")], rows[:, HEAD.index("equal")] = start, max(rtol, EQUAL)
         for channel in self.channels:
             if channel.endswith(DEFLECTION):
-                rows[:, self.column("max_wanted", channel)] = GUARD
+                rows[:, self.columns["max_wanted", channel]] = GUARD
         for name, channel in wanted:
-            rows[:, self.column(f"{name}_wanted", channel)] = 1.0
+            rows[:, self.columns[f"{name}_wanted", channel]] = 1.0
         return rows
 
 
@@ -162,7 +159,7 @@ def void_moment(manifest: Manifest, values: Mapping[str, float], row: Array) -> 
     layout = reduction_rows(manifest)
     for bearing, (deflection,) in _deflections(manifest, row[None, :]):
         if words := void_words(bearing, values, deflection):
-            return words, float(row[layout.column("max_time", bearing.prefix + DEFLECTION)])
+            return words, float(row[layout.columns["max_time", bearing.prefix + DEFLECTION]])
     return None
 
 
@@ -170,7 +167,7 @@ def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo,
     """Of each bearing: largest deflection of a ball in each run [m]."""
     layout = reduction_rows(manifest)
     for bearing in manifest.bearings:
-        yield bearing, rows[:, layout.column("max", bearing.prefix + DEFLECTION)]
+        yield bearing, rows[:, layout.columns["max", bearing.prefix + DEFLECTION]]
 
 
 @lru_cache(maxsize=1)

@@ -80,15 +80,17 @@ function readAddress() {
 }
 
 // -------------------------------------------------------------------------------------------------------------- results
-const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) + 360) % 360).toFixed(1)}\u00b0 of turn ${Math.floor(time / run.turn + 1e-9) + 1}`;
+const turnsTo = (run, time) => (solver.rows ? Math.abs(angleOf(run, [time]) - angleOf(run, [0])) / TURN : time / run.turn);
+const degrees = (run, time) => `at ${((((angleOf(run, [time]) / DEGREE) % 360) + 360) % 360).toFixed(1)}\u00b0 of turn ${Math.floor(turnsTo(run, time) + 1e-9) + 1}`;
 
 // The last whole turns after which loads repeat, from a whole turn on, as native runs take them; null where there are none.
-function wholeCycles({ nodes, turn }) {
-  const near = 1e-9, [first, last] = [nodes[0][0] / turn, nodes.at(-1)[0] / turn];
-  for (const end of [last, Math.floor(last + near)]) {
+function wholeCycles(run) {
+  const near = 1e-9, [first, last] = [run.nodes[0], run.nodes.at(-1)].map(([time]) => turnsTo(run, time));
+  for (const end of solver.rows ? [last] : [last, Math.floor(last + near)]) {
     const count = solver.shown * Math.floor((end - first) / solver.shown + near), begin = end - count;
-    if (count > 0 && Math.min(Math.abs(begin - first), Math.abs(begin - Math.round(begin))) < near * Math.max(last, 1)) {
-      return { nodes: nodes.filter(([time]) => time / turn > begin - near && time / turn < end + near) };
+    const edge = solver.rows ? first : Math.round(begin);
+    if (count > 0 && Math.min(Math.abs(begin - first), Math.abs(begin - edge)) < near * Math.max(last, 1)) {
+      return { count, nodes: run.nodes.filter(([time]) => turnsTo(run, time) > begin - near && turnsTo(run, time) < end + near) };
     }
   }
   return null;
@@ -126,8 +128,8 @@ function resultsOf(run) {
     peak("peak_torque", "Highest drive torque, either way", "N\u00b7m", (row) => Math.abs(row[solver.torque]));
     shortly("torque");
     if (run.speed && solver.angle === null) {
-      const part = wholeCycles(run);
-      rest("drive_work", "Work of the drive in a turn", "J", part ? Math.sign(run.speed) * TURN * mean(part, measured(part, (row) => row[solver.torque])) : NaN);
+      const part = wholeCycles(run), torque = part && measured(part, (row) => row[solver.torque]), angles = part && part.nodes.map((row) => angleOf(run, row));
+      rest("drive_work", "Work of the drive in a turn", "J", part ? torque.reduce((sum, now, k) => sum + (k ? 0.5 * (now + torque[k - 1]) * (angles[k] - angles[k - 1]) : 0), 0) / part.count : NaN);
     }
   }
   const tops = peaks(run, measures, series);

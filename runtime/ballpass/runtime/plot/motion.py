@@ -291,7 +291,11 @@ def phase_portrait(record: Record) -> Figure:
     if record.cycle_length is not None:
         source = record.longer or record
         points = stroboscopic_points(
-            source.t, source.values("inner.x"), source.values("inner.vx"), cycle_length=record.cycle_length
+            source.t,
+            source.values("inner.x"),
+            source.values("inner.vx"),
+            cycle_length=record.cycle_length,
+            offset=source.start_passed,
         )
         look: dict[str, Any] = {"color": SAND, "markeredgecolor": "black", "markeredgewidth": 0.7, "linestyle": "none"}
         for panel in panels:

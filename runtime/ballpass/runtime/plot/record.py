@@ -104,7 +104,13 @@ class Record:
     @property
     def cycle_turns(self) -> int:
         """Turns after which all loads repeat: two for a four-stroke engine."""
-        return timeline.cycle_turns(self.manifest)
+        return timeline.cycle_turns(self.manifest, self._values)
+
+    @property
+    def start_passed(self) -> float:
+        """A time at which the driver stands at the angle of its start, while it turns evenly [s]."""
+        turning = timeline.driver(self.manifest, self._values)
+        return turning.first_pass(float(turning.at(0.0)[0]), begin=float(turning.begin[-1])) or 0.0
 
     def last_turns(self, count: int) -> slice:
         """The last whole turns, at most `count`; the whole record where it holds none."""
@@ -156,7 +162,7 @@ class Record:
     def frequencies(self) -> KinematicFrequencies | None:
         """Kinematic frequencies of the bearing [Hz]; None without a bearing, or where the speed changes."""
         bearing = self.bearing
-        if bearing is None or not timeline.is_even(self.manifest, self._values):
+        if bearing is None or self.cycle_length is None:
             return None
         return frequencies_of(bearing, mean_speeds(self.solution))
 

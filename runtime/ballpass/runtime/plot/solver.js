@@ -53,10 +53,11 @@ async function solve(values, stale) {
   if (faults.length) throw new Error(faults.join("\n"));
   must(machine.ballpass_start(machine.one, 0));
   const known = inMemory(machine.ballpass_values(machine.one), solver.places).slice(), { cycles, duration, transient, samples } = solver.run;
-  const speed = solver.speed === null ? 0 : known[solver.speed], turn = speed ? TURN / Math.abs(speed) : Infinity;
-  const whole = cycles ? cycles * turn : duration, base = Math.max(1, Math.round(samples * (turn < Infinity ? whole / turn : 1))), count = finer * base;
-  if (transient && !speed) throw new Error("Transient cycles are turns, and nothing turns in this run.");
-  const time = (k) => whole * (k / count), least = transient ? transient * turn * (1 - 1e-12) : 0;
+  const place = solver.rows ? solver.rows[1].at(-1) : solver.speed, speed = place === null ? 0 : known[place], turn = speed ? TURN / Math.abs(speed) : Infinity;
+  const whole = cycles ? machine.ballpass_after(machine.one, cycles) : duration, turns = Math.max(whole / turn, machine.ballpass_turns(machine.one, whole));
+  const base = Math.max(1, Math.round(samples * (turns || 1))), count = finer * base;
+  const time = (k) => whole * (k / count), least = transient ? machine.ballpass_after(machine.one, transient) * (1 - 1e-12) : 0;
+  if (!Number.isFinite(least)) throw new Error("Transient cycles are turns, and nothing turns in this run, or not so often.");
   let first = 0, began = performance.now();
   while (time(first) < least) first += 1;
   const reduced = inMemory(machine.reduction, solver.reduction.size).fill(0); // the highest ball forces, of every step

@@ -160,8 +160,8 @@ def _bearing(
         "ball": place[f"{bearing.path}.ball_diameter"],
         "clearance": place[f"{bearing.path}.clearance"],
         "force": [column[f"{force}[{k + 1}]"] for k in range(bearing.balls)],
-        "top": {kind: rows.column(kind, force) for kind in ("max_wanted", "max", "max_time")},
-        "deflection": {kind: rows.column(kind, own(DEFLECTION)) for kind in ("max_wanted", "max")},
+        "top": {kind: rows.columns[kind, force] for kind in ("max_wanted", "max", "max_time")},
+        "deflection": {kind: rows.columns[kind, own(DEFLECTION)] for kind in ("max_wanted", "max")},
         "cosine": place.get(f"{bearing.path}.cos_contact_angle"),
         "gap": place.get(f"{bearing.path}.radial_gap"),
         "limits": limit_templates(bearing),
@@ -176,8 +176,8 @@ def _life(rows: ReductionRows, bearing: BearingInfo) -> dict[str, float]:
     """How a life depends on the loads, see `ballpass.runtime.ratings.life.ElementLife`, and where they are reduced."""
     of, turned = rated_element(bearing).life, bearing.prefix + TURNED
     return {
-        "wanted": rows.column("integral_wanted", turned),
-        "turned": rows.column("integral", turned),
+        "wanted": rows.columns["integral_wanted", turned],
+        "turned": rows.columns["integral", turned],
         "raceways": rows.first_place(bearing.prefix),
         "standing": float(of.standing),
         "weibull": float(of.weibull),

@@ -32,8 +32,8 @@ from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.equilibrium_newton import FIRST_STEP, SearchEnd, settle
-from ballpass.runtime.run.request import check_length
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.span import check_length
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
 
 Array = NDArray[np.float64]
@@ -260,7 +260,7 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         time = checked_time(0.0 if t is None else t)
         if time < 0.0:
             raise RequestError(f"t: {t!r} s lies before the start. Allowed: times from 0 s on.")
-        check_length(time, timeline.period(model.manifest, numbers.values))
+        check_length(timeline.driver(model.manifest, numbers.values), time)
         return time
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
@@ -276,7 +276,8 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
             f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
             f"to 4 pi; for degrees give math.radians({crank_angle!r})."
         )
-    turning, turns = timeline.driver(model.manifest, numbers.values), timeline.cycle_turns(model.manifest)
+    turning = timeline.driver(model.manifest, numbers.values)
+    turns = timeline.cycle_turns(model.manifest, numbers.values)
     ahead = angle - timeline.crank_angle(model.manifest, numbers.values, 0.0)
     if turning.fastest == 0.0:
         if abs(math.remainder(ahead, TURN)) < ANGLE_RESOLUTION:

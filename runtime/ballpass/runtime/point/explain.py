@@ -104,6 +104,7 @@ class Explanation(ShortRepr, Reported):
     method, reason : the choice of ``auto``, and why
     unusual : sentences about numbers outside of their usual ranges
     turns : after which all loads repeat, two for a four-stroke engine
+    first : time that the first of them take [s]
 
     Examples
     --------
@@ -126,9 +127,10 @@ class Explanation(ShortRepr, Reported):
     unusual: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     turns: int = 1
+    first: float = math.inf
 
     def _report(self) -> Report:
-        repeats = self.turns * self.turn
+        repeats = self.first
         where = _places(self.breakpoints, repeats) or "none"
         first = "turn" if self.turns == 1 else f"{self.turns} turns"
         first += " and of tables over time" if any(item.time >= repeats for item in self.breakpoints) else ""
@@ -203,9 +205,10 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     values = numbers.values
     manifest = model.manifest
     turn = timeline.period(manifest, values)
-    turns = timeline.cycle_turns(model.manifest)
-    span = turns * turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
-    length = max(span, _changing(model, values, turn))
+    turns = timeline.cycle_turns(model.manifest, values)
+    first = timeline.driver(manifest, values).after(turns)
+    span = first if math.isfinite(first) else (manifest.run.duration or 1.0)
+    length = max(span, _changing(model, values))
     scales, unsupported = _time_scales(model, parameters, span, length) if model.states else ((), ())
     method, reason = _method(model, scales, turn)
     return Explanation(
@@ -213,6 +216,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         outputs=model.outputs,
         turn=turn,
         turns=turns,
+        first=first,
         breakpoints=_breakpoints(model, values, span, length),
         smoothness=manifest.smoothness,
         scales=scales,
@@ -238,10 +242,11 @@ def _places(breakpoints: Sequence[Breakpoint], repeats: float) -> str:
     return f"{len(breakpoints)} from {places[0]} to {places[-1]}: {loads} (each: --json)"
 
 
-def _changing(model: LoadedModel, values: Mapping[str, float], turn: float) -> float:
+def _changing(model: LoadedModel, values: Mapping[str, float]) -> float:
     """Time over which loads change but with the turn [s]: with tables over time the run, else a harmonic's period."""
     run = model.manifest.run
-    length = run.duration or (run.cycles * turn if run.cycles is not None and math.isfinite(turn) else 0.0)
+    length = run.duration or timeline.driver(model.manifest, values).after(run.cycles or 0.0)
+    length = length if math.isfinite(length) else 0.0
     if timeline.changes_over_time(model.manifest, values, 0.0, length):
         return length
     return min(length, timeline.longest_harmonic(model.manifest, values))
@@ -270,7 +275,7 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, l
 
 def _angle(model: LoadedModel, values: Mapping[str, float], time: float) -> float:
     """Angle of driver or shaft within the turns after which loads repeat [rad]."""
-    turns = timeline.cycle_turns(model.manifest)
+    turns = timeline.cycle_turns(model.manifest, values)
     return float(timeline.driver(model.manifest, values).at(time)[0] % (turns * TURN))
 
 

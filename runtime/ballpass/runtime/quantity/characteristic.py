@@ -125,7 +125,7 @@ def characteristic_lines(
         return ()
     unit = speed if orders else 1.0
     shaft = speed / unit
-    parts = timeline.cycle_turns(manifest)
+    parts = timeline.cycle_turns(manifest, values)
     found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="", parts=parts)]
     for rate, (load, *_) in timeline.loads(manifest).items():
         frequency = abs(values[rate]) / TURN / unit
@@ -212,14 +212,15 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
     ----------
     values : parameters and derived constants by name
     """
-    turns, parts = TURNS, timeline.cycle_turns(manifest)
+    turns, parts = TURNS, timeline.cycle_turns(manifest, values)
+    values = {**values, **timeline.settled_rates(manifest, values)}
     for bearing in manifest.bearings:
         found = frequencies_of(bearing, values)
         order = found.ball_pass_outer / found.shaft if found.shaft > 0.0 else 0.0
         near = abs(order - round(order * parts) / parts)
         if near * MOST > APART:
             turns = max(turns, math.ceil(APART / near))
-    return timeline.whole_cycles(manifest, turns)
+    return timeline.whole_cycles(manifest, values, turns)
 
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:

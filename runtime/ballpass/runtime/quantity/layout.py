@@ -210,8 +210,8 @@ class NodeLayer:
 
         asked = None if timeline.is_even(manifest, run.numbers.values) else turned
         if layout.still:
-            return uniform_panels(layout.edges, run.turn, asked)
-        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.turn, asked)
+            return uniform_panels(layout.edges, run.stretch, asked)
+        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.stretch, asked)
 
     def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
         """The run along the nodes of panels; what the layout knows in panels that it has is taken from there."""
@@ -383,7 +383,7 @@ class NodeLayer:
         rows = reduction_rows(self.model.manifest)
 
         def wanted(item: Quantity, kind: str) -> Wanted:
-            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if self._is_held(item) else None
+            seen = float(row[rows.columns[f"{kind}_time", item.channel]]) if self._is_held(item) else None
             ball = None if item.ball is None else item.ball - 1
             sign = 1.0 if kind == "max" else -1.0
             return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))

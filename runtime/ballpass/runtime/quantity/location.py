@@ -85,7 +85,7 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
     turning = timeline.driver(manifest, numbers.values)
     if turning.fastest == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
-    time = turning.last_pass(angle, end, timeline.cycle_turns(manifest))
+    time = turning.last_pass(angle, end, timeline.cycle_turns(manifest, numbers.values))
     if time is None:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
     return time, asked
@@ -142,10 +142,12 @@ def place_slope(
     info = timeline.driver_info(manifest)
     assert info is not None  # something turns
     rate = Turning.of(info, numbers.values).at(time)[1]
-    return np.array([-timeline.angle_slope(info, numbers.values, moved, time) / rate for moved in _moved(info, slopes)])
+    return np.array(
+        [-timeline.angle_slope(info, numbers.values, moved, time) / rate for moved in moved_numbers(info, slopes)]
+    )
 
 
-def _moved(info: TurningInfo, slopes: Callable[[str], Array]) -> Iterator[dict[str, float]]:
+def moved_numbers(info: TurningInfo, slopes: Callable[[str], Array]) -> Iterator[dict[str, float]]:
     """Directions of the numbers that a turning depends on."""
     columns = {name: slopes(name) for name in timeline.names_of(info)}
     for k in range(len(next(iter(columns.values())))):
@@ -203,7 +205,9 @@ def _rate_slopes(view: View, rate: str) -> Array:
     turning, ends = Turning.of(info, values), [int(np.argmin(nodes.t)), int(np.argmax(nodes.t))]
     length = float(nodes.t[ends[1]] - nodes.t[ends[0]])
     before, after = (
-        np.array([timeline.angle_slope(info, values, moved, float(nodes.t[k])) for moved in _moved(info, view.slopes)])
+        np.array(
+            [timeline.angle_slope(info, values, moved, float(nodes.t[k])) for moved in moved_numbers(info, view.slopes)]
+        )
         + float(turning.at(nodes.t[k])[1]) * nodes.slope[k]
         for k in ends
     )

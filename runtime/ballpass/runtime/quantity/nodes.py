@@ -106,19 +106,19 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     RequestError
         Several loads switch at one time, and a parameter moves one of them away from another.
     """
-    times, near = segments.times, APART * min(run.turn, run.duration)
+    times, near = segments.times, APART * min(run.stretch, run.duration)
     first = int(np.argmin(np.abs(times - run.start)))
     columns = np.zeros((len(times), 0 if chain is None else len(chain.names)))
     if chain is not None:
-        turning = turn_slope(run, chain)
+        even = timeline.is_even(run.model.manifest, run.numbers.values) and math.isfinite(run.stretch)
         for k, time in enumerate(times[1:-1].tolist(), start=1):
-            moved = chain.breakpoint(time)
-            if moved is not None and abs(time - run.start) > near:
+            moved, counts = chain.breakpoint(time), abs(time - run.start) <= near
+            if moved is not None and not counts:
                 columns[k] = moved
-            elif math.isfinite(run.turn):
-                columns[k] = time / run.turn * turning
-        if run.turns is not None:
-            columns[-1] = run.turns * turning
+            elif counts or even:
+                columns[k] = chain.after(time)
+        if run.span.asked is not None:
+            columns[-1] = chain.after(run.end, run.begin)
     return Edges(times=times, slopes=columns, segment=np.arange(len(times) - 1), first=first)
 
 
@@ -139,15 +139,6 @@ def with_passages(edges: Edges, times: Array, slopes: Array) -> Edges:
         segment=segment,
         first=int(np.flatnonzero(order == edges.first)[0]),
     )
-
-
-def turn_slope(run: Run, chain: Chain) -> Array:
-    """Derivative of the time of a turn, shape (directions,) [s/unit]; zero when nothing turns."""
-    manifest, values = run.model.manifest, run.numbers.values
-    speed, name = timeline.shaft_speed(manifest, values), timeline.speed_name(manifest)
-    if name is None or speed == 0.0:
-        return np.zeros(len(chain.names))
-    return np.asarray(-run.turn / speed * chain.derivative(name))
 
 
 def no_nodes() -> NodePlan:

@@ -136,7 +136,7 @@ def find_passages(
         times = times - np.angle(np.exp(1j * past[rows, columns])) / rates
     # of the fastest turn: one at the first speed of a run-up from rest has no end
     fastest = float(np.max(np.abs(rates), initial=0.0)) / TURN
-    before = angles.before / max(1.0 / min(run.turn, run.duration), fastest)
+    before = angles.before / max(1.0 / min(run.stretch, run.duration), fastest)
     distance = np.min(np.abs(track.edges.times[:, None] - times), axis=0)
     kept_ones = distance > max(APART * run.duration, 10.0 * before)
     return Passages(

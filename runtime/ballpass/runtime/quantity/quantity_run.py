@@ -243,7 +243,7 @@ class QuantityRun:
         found: dict[str, Estimate] = {}
         layouts: list[Layout] = []
         if noded:
-            self._check_memory(directions, max(len(kept), math.ceil(run.cycles)))
+            self._check_memory(directions, max(len(kept), math.ceil(run.span.cycles)))
             layouts = self._layer.lay(run, kept, row, noded)
             for layout in layouts:
                 view = self._plain_view(run, layout)

@@ -244,7 +244,7 @@ class ReducedRuns:
 
     def entry(self, row: str, channel: str) -> Array:
         """An entry of `ROWS` of a channel, shape (runs,)."""
-        return np.asarray(self.rows[:, self.layout.column(row, channel)])
+        return np.asarray(self.rows[:, self.layout.columns[row, channel]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -126,7 +126,7 @@ def follow(
     made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks, run.magnitude)
     if made is not None and sensitivity_rtol is not None:
         made.control(sensitivity_rtol, run.magnitude)
-    near = time_resolution(run.begin, run.end, run.turn)
+    near = time_resolution(run.begin, run.end, run.stretch)
     samples = Samples(times=times, x=np.empty((len(times), count)), near=near, end=run.end, directions=made)
     start_run(run, [samples]).go_on()
     states, growth = samples.x, 0.0

@@ -121,7 +121,7 @@ def _pressure(
 
     numbers = model.numbers(overrides)
     whole = resolve(model, numbers, Request())
-    turns = cycle_turns(model.manifest) if repeats(model, numbers.values, whole.start) else None
+    turns = cycle_turns(model.manifest, numbers.values) if repeats(model, numbers.values, whole.start) else None
     cycles = None if turns is None else model.run_settings.transient_cycles + turns
     run = resolve(model, numbers, Request(cycles=cycles))
     samples = load_samples(run)[info.prefix]
@@ -141,7 +141,7 @@ def _clearance(
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.run.settle import repeats
-    from ballpass.runtime.time.timeline import period, whole_cycles
+    from ballpass.runtime.time.timeline import driver, whole_cycles
 
     name = f"{info.path}.clearance"
     present = model.numbers(overrides).values[name]
@@ -154,8 +154,8 @@ def _clearance(
     clearances = np.linspace(least, most, POINTS)
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
     transient, values = model.run_settings.transient_cycles, model.numbers(overrides).values
-    alike = repeats(model, values, transient * period(model.manifest, values))
-    turns = whole_cycles(model.manifest, TURNS) if alike else None
+    alike = repeats(model, values, driver(model.manifest, values).after(transient))
+    turns = whole_cycles(model.manifest, values, TURNS) if alike else None
     cycles = None if turns is None else transient + turns
     found = model.simulate_many(table, [f"{info.prefix}life"], cycles=cycles)
     if found.interrupted:

@@ -249,7 +249,7 @@ def section(
         raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    angle, turns = 0.0 if at is None else at, cycle_turns(manifest)
+    angle, turns = 0.0 if at is None else at, cycle_turns(manifest, numbers.values)
     times = turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
     refuse_changing(manifest, numbers.values, "section", turn * turns * settling, float(times[-1]))
     with shown("taking points", progress):

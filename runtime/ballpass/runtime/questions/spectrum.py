@@ -456,7 +456,7 @@ def spectrum(
     marks = characteristic_lines(solution.manifest, numbers, orders=orders)
     if recording is None and not carries_lines(solution.manifest, channel):
         marks = tuple(mark for mark in marks if not mark.of_bearing)
-    changing = run.period is None and run.cycle_length is not None
+    changing = solution.period is None and run.cycle_length is not None
     return SignalSpectrum(
         of=channel,
         unit=unit,
@@ -579,14 +579,14 @@ def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: f
     """Turns of a run that separates ball pass from the shaft; None for those of the scene, where turns differ."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
     from ballpass.runtime.run.settle import repeats
-    from ballpass.runtime.time.timeline import period
+    from ballpass.runtime.time.timeline import driver
 
     manifest, values = model.manifest, model.numbers(parameters).values
-    turn, settings = period(manifest, values), model.run_settings
+    turning, settings = driver(manifest, values), model.run_settings
     dropped = settings.transient_cycles if transient is None else transient
-    if not repeats(model, values, dropped * turn):
+    if not repeats(model, values, turning.after(dropped)):
         return None
-    stated = settings.cycles if settings.cycles is not None else (settings.duration or 0.0) / turn
+    stated = settings.cycles if settings.cycles is not None else turning.turns(0.0, settings.duration or 0.0)
     return max(stated, dropped + turns_to_separate(manifest, values))
 
 

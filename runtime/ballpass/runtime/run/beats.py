@@ -46,12 +46,14 @@ class _Rate:
 
 
 def beats(manifest: Manifest, values: Mapping[str, float]) -> Iterator[Beat]:
-    """Beats of harmonic loads and passing balls with the shaft, and with each other; none where nothing turns.
+    """Beats of harmonic loads and passing balls with the shaft, and with each other, at the speed behind the last row;
+    none where nothing turns.
 
     Parameters
     ----------
     values : parameters and derived constants by name
     """
+    values = {**values, **timeline.settled_rates(manifest, values)}
     shaft = abs(timeline.shaft_speed(manifest, values)) / TURN
     if shaft == 0.0:
         return

@@ -20,6 +20,7 @@ from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import Turning
 
 
 class Chain:
@@ -69,6 +70,13 @@ class Chain:
         named = timeline.names_of_inputs(model.manifest)
         slopes = np.array([self.derivative(name) for name in named]).reshape(len(named), len(names))
         self.moved_numbers = [dict(zip(named, column.tolist(), strict=True)) for column in slopes.T]
+        info = timeline.driver_info(model.manifest)
+        moving = () if info is None else timeline.names_of(info)
+        steps = [{name: float(self.derivative(name)[column]) for name in moving} for column in range(len(names))]
+        self._drivers = [
+            Turning.of(info, timeline.along(numbers.values, moved)) if info and any(moved.values()) else None
+            for moved in steps
+        ]
         speed, mechanism = timeline.speed_name(model.manifest), model.manifest.mechanism
         if speed is not None and numbers.values[speed] != 0.0 and timeline.is_even(model.manifest, numbers.values):
             self.stretch = -self.derivative(speed) / numbers.values[speed]
@@ -96,6 +104,16 @@ class Chain:
         for column, moved in enumerate(self.moved_numbers):
             u[:, :, column] = timeline.input_slopes(self._manifest, self._values, moved, starts, middles)
         return u
+
+    def after(self, time: float, begin: float = 0.0) -> np.ndarray:
+        """Derivative of the time at which as many turns are made since another, shape (directions,) [s/unit].
+
+        Raises
+        ------
+        RequestError
+            Driver or shaft stands there.
+        """
+        return np.array([0.0 if one is None else one.after_slope(time, begin) for one in self._drivers])
 
     def breakpoint(self, time: float) -> np.ndarray | None:
         """Derivative of the time of the breakpoint there, shape (directions,); None where no load switches [s/unit].

@@ -24,7 +24,7 @@ from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, raceway_powers, reduction_of
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, asked_transient, resolve
+from ballpass.runtime.run.resolve import Run, asked_span, resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS, repeats
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
@@ -73,19 +73,18 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     """
     manifest = model.manifest
     turn = timeline.period(manifest, numbers.values)
-    transient = asked_transient(model, request.transient_cycles)
+    span = asked_span(model, numbers, request)
     given = request.cycles is not None or request.duration is not None
-    doubles = not given and repeats(model, numbers.values, transient * turn)
-    turns: float = timeline.whole_cycles(manifest, LEAST)
+    doubles = not given and repeats(model, numbers.values, span.start)
+    turns: float = timeline.whole_cycles(manifest, numbers.values, LEAST)
     slowest = timeline.longest_harmonic(manifest, numbers.values) / turn
     beat = slowest_beat(manifest, numbers.values, MOST // 2 * turn) / turn
-    turns = max(turns, timeline.whole_cycles(manifest, math.ceil(beat)))
+    turns = max(turns, timeline.whole_cycles(manifest, numbers.values, math.ceil(beat)))
     if slowest > 1.0:  # whole periods of the load, as far as there are turns
         turns = slowest * math.ceil(turns / slowest)
     covered, turns = 2 * turns <= MOST, min(turns, MOST // 2)
-    if doubles:
-        request = replace(request, cycles=transient + turns)
-    going = start_reducing(resolve(model, numbers, request), _channels(model))
+    run = resolve(model, numbers, request, span=span.counting(turns) if doubles else span)
+    going = start_reducing(run, _channels(model))
     start, end = going.run.start, going.run.end
     if not doubles:
         going.go_on((start + end) / 2.0)
@@ -129,10 +128,10 @@ def _history(going: ReducedRun) -> LoadHistory:
     for bearing in manifest.bearings:
         (powers[bearing.prefix],) = raceway_powers(manifest, bearing, going.row[None, :])
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
-        turned = going.row[layout.column("integral", bearing.prefix + TURNED)]
+        turned = going.row[layout.columns["integral", bearing.prefix + TURNED]]
         speeds[bearing.prefix] = float(turned) / duration
     return LoadHistory(
-        run=replace(going.run, end=going.run.start + duration),
+        run=replace(going.run, span=replace(going.run.span, end=going.run.start + duration)),
         turns=duration * abs(speed) / TURN if speed else None,
         fastest=fastest,
         speeds=speeds,

@@ -224,10 +224,10 @@ class RunUnderWay:
         run, until = self.run, self.run.end if until is None else until
         directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
         stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
-        allowed = allowance(until - run.begin, run.turn, self.time, self.steps + self.rejected)
+        allowed = allowance(until - run.begin, run.stretch, self.time, self.steps + self.rejected)
         windows: Iterable[Segments] = (self.segments,) if self.segments is not None else ()
         if self.segments is None or (self.time, until) != (run.begin, run.end):
-            windows = run_windows(run.model, run.numbers, (self.time, until), run.turn, run.start)
+            windows = run_windows(run.model, run.numbers, (self.time, until), run.stretch, run.start)
         # a derivative at fixed time jumps with a load, and a call does not have the rate before its start
         for left in joined_segments(windows) if directions is not None else windows:
             held, taken, first_step = (stepper.hold() if directions is None else None), 0, 0.0
@@ -330,7 +330,7 @@ class RunUnderWay:
 
 def segments_of(run: Run) -> Segments:
     """All segments of a run."""
-    windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
+    windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.stretch, run.start)
     (segments,) = joined_segments(windows, all_=True)
     return segments
 

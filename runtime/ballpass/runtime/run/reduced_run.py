@@ -75,7 +75,7 @@ class ReducedRun:
             end=going.state,
             steps=going.steps,
             rejected=going.rejected,
-            turn=going.run.turn,
+            turn=going.run.span.turning.turn,
         )
         assert found is not None  # `check_steady` leaves some time
         return found

@@ -196,7 +196,7 @@ def reduction_of(rows: ReductionRows, row: np.ndarray, channel: str, duration: f
 
 
 def _channels(rows: ReductionRows, row: np.ndarray, names: Sequence[str], duration: float) -> dict[str, Reduction]:
-    places = [[rows.column(kind, name) for name in names] for kind in ROWS]
+    places = [[rows.columns[kind, name] for name in names] for kind in ROWS]
     entries = dict(zip(ROWS, row[places], strict=True))
     means, stds = moments_of(entries["shift"], entries["integral"], entries["square"], np.array(duration))
     of = {kind: values.tolist() for kind, values in entries.items()} | {"mean": means.tolist(), "std": stds.tolist()}
@@ -255,6 +255,6 @@ def raceway_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -
         Loads in kN, shape (members, 2, SECTORS); zero where no ball passes.
     """
     layout = reduction_rows(manifest)
-    turned = rows[:, layout.column("integral", bearing.prefix + TURNED), None, None]
+    turned = rows[:, layout.columns["integral", bearing.prefix + TURNED], None, None]
     passes = np.where(turned > 0.0, turned, np.inf) * bearing.balls / SECTORS  # no pass, no damage
     return np.asarray(layout.raceways(rows, bearing.prefix) / passes)

@@ -22,10 +22,6 @@ from ballpass.runtime.run.start import Start
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import Manifest
 
-#: Longest run, in turns and in time [s].  A press takes days of computing for so many turns, and
-#: the angle of an edge within the last of them is exact to a thousandth of a turn.
-MOST_TURNS, MOST_TIME = 1e9, 1e9
-
 #: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
 MAX_NUMBERS = 2**29
 
@@ -143,38 +139,6 @@ def asked_length(model: LoadedModel, cycles: float | None, duration: float | Non
     if duration is None or not 0.0 < real(duration) < math.inf:
         raise RequestError(f"duration: a time above 0 s is expected, not {duration!r:.80}.")
     return None, float(duration)
-
-
-def run_length(model: LoadedModel, request: Request, turn: float) -> float:
-    """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns where nothing turns."""
-    cycles, duration = asked_length(model, request.cycles, request.duration)
-    if duration is not None:
-        return duration
-    assert cycles is not None
-    if not math.isfinite(turn):
-        raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
-    return cycles * turn
-
-
-def check_length(duration: float, turn: float) -> None:
-    """Refuse a run that would not come to its end.
-
-    Parameters
-    ----------
-    duration, turn : of the run, and of a turn, infinite where nothing turns [s]
-
-    Raises
-    ------
-    RequestError
-        It is longer than `MOST_TURNS` or `MOST_TIME`.
-    """
-    turns = duration / turn
-    if not (turns <= MOST_TURNS * (1.0 + 1e-9) and duration <= MOST_TIME):
-        words = f"{duration:g} s, {turns:.3g} turns," if turns else f"{duration:g} s"
-        raise RequestError(
-            f"A run of {words} is too long to be computed. Allowed: up to {MOST_TURNS:g} turns and {MOST_TIME:g} s. "
-            "Give fewer cycles or a shorter duration."
-        )
 
 
 def tolerance(name: str, given: float) -> float:

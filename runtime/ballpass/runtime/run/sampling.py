@@ -6,24 +6,20 @@ In: a `Request` and the `Run` made of it.  Out: a `Sampling`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import real, vector, whole, wrong_unit
+from ballpass.runtime.contract.parameters import Numbers, real, vector, whole, wrong_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.request import (
-    Request,
-    check_length,
-    check_memory,
-    no_output,
-    run_length,
-)
+from ballpass.runtime.run.request import Request, check_memory, no_output
+from ballpass.runtime.run.resolve import asked_span
 from ballpass.runtime.run.start import start_time
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.span import Span
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,24 +28,20 @@ class Sampling:
 
     Attributes
     ----------
-    duration : of the run, which sample times may give [s]
+    span : of the run, which sample times may give
     times : increasing, from the start of the run on, shape (samples,) [s]
     even : whether they are the ends of equal intervals of the whole run
     outputs : names of the outputs to evaluate
     """
 
-    duration: float
+    span: Span
     times: np.ndarray
     even: bool
     outputs: tuple[str, ...]
 
 
-def sampling_of(model: LoadedModel, request: Request, values: Mapping[str, float]) -> Sampling:
+def sampling_of(model: LoadedModel, request: Request, numbers: Numbers) -> Sampling:
     """Check samples and outputs of a request.
-
-    Parameters
-    ----------
-    values : parameters and derived constants by name
 
     Raises
     ------
@@ -57,43 +49,39 @@ def sampling_of(model: LoadedModel, request: Request, values: Mapping[str, float
         The request is wrong; the message says what is allowed.
     """
     outputs = output_names(model.manifest, request.outputs)
-    duration, times = _sample_times(model, request, values, outputs)
+    span, times = _sample_times(model, request, numbers, outputs)
     even = request.times is None and request.sample_rate is None
-    return Sampling(duration=duration, times=times, even=even, outputs=outputs)
+    return Sampling(span=span, times=times, even=even, outputs=outputs)
 
 
 def _sample_times(
-    model: LoadedModel, request: Request, values: Mapping[str, float], outputs: Sequence[str]
-) -> tuple[float, np.ndarray]:
-    """Length of the run, and the times of its samples."""
-    begin, turn = start_time(request.initial), timeline.period(model.manifest, values)
+    model: LoadedModel, request: Request, numbers: Numbers, outputs: Sequence[str]
+) -> tuple[Span, np.ndarray]:
+    """The time of the run, and those of its samples."""
+    begin = start_time(request.initial)
     given = ("samples_per_cycle", "times", "sample_rate")
     several = [f"{name} = {getattr(request, name)!r:.40}" for name in given if getattr(request, name) is not None]
     if len(several) > 1:
         raise RequestError(f"{' and '.join(several)} were both given: give one of them.")
     if request.sample_rate is not None:
-        duration = run_length(model, request, turn)
-        check_length(begin + duration, turn)
-        rate = checked_rate(request.sample_rate)
-        _check_memory(model, duration * rate, outputs)
-        times = times_at(rate, begin, begin + duration)
+        span, rate = asked_span(model, numbers, request), checked_rate(request.sample_rate)
+        _check_memory(model, span.duration * rate, outputs)
+        times = times_at(rate, begin, span.end)
         if not times.size:
             raise RequestError(
-                f"sample_rate: {rate:g} Hz has no sample within the run of {duration:g} s. Give a higher rate, or run "
-                "longer."
+                f"sample_rate: {rate:g} Hz has no sample within the run of {span.duration:g} s. Give a higher rate, or "
+                "run longer."
             )
-        return duration, times
+        return span, times
     if request.times is None:
-        duration = run_length(model, request, turn)
-        check_length(begin + duration, turn)
-        asked = request.samples_per_cycle
+        span, asked = asked_span(model, numbers, request), request.samples_per_cycle
         per_cycle = whole("samples_per_cycle", model.manifest.run.samples_per_cycle if asked is None else asked)
-        # a run-up has most of its turns behind a slow first one
-        turns = max(duration / turn, timeline.driver(model.manifest, values).turns(begin, begin + duration))
+        # where its speed changes the driver may be slow on the mean
+        turns = max(span.duration / timeline.stretch(model.manifest, numbers.values), span.cycles)
         wanted = np.rint(float(per_cycle) * turns) if turns > 0.0 else float(per_cycle)
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
-        return duration, begin + duration * (np.arange(count + 1) / count)
+        return span, begin + span.duration * (np.arange(count + 1) / count)
     if wrong := wrong_unit(request.times, "s"):
         raise RequestError(f"times: {wrong}")
     times = vector(request.times)
@@ -116,20 +104,20 @@ def _sample_times(
                 f"times: the run ends at the last one, which must be above {begin:g} s, not {float(times[-1])!r}. Or "
                 "give cycles."
             )
+        span = asked_span(model, numbers, replace(request, duration=duration))
     else:
-        duration = run_length(model, request, turn)
-        if times[-1] > (begin + duration) * (1.0 + timeline.TIME_RESOLUTION):
+        span = asked_span(model, numbers, request)
+        if times[-1] > span.end * (1.0 + timeline.TIME_RESOLUTION):
             raise RequestError(
-                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies after it. Run "
-                "longer, or leave cycles and duration out: the run then ends at the last time."
+                f"times: the run ends at {span.end!r} s, and {float(times[-1])!r} s lies after it. Run longer, or "
+                "leave cycles and duration out: the run then ends at the last time."
             )
-    check_length(begin + duration, turn)
     if times[0] < begin:
         raise RequestError(
             f"times: the run starts at {begin:g} s, and {float(times[0])!r} s lies before it. Leave earlier times out."
         )
     _check_memory(model, len(times), outputs)
-    return duration, times
+    return span, times
 
 
 def checked_rate(given: float) -> float:

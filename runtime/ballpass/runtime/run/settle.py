@@ -27,9 +27,9 @@ from ballpass.runtime.run.beats import slowest_beat
 from ballpass.runtime.run.reduced_run import start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, asked_transient, resolve
+from ballpass.runtime.run.resolve import Run, asked_span, resolve
 from ballpass.runtime.run.solution import Solution
-from ballpass.runtime.run.start import RunEnd, start_time
+from ballpass.runtime.run.start import RunEnd
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
@@ -109,25 +109,24 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     turn = timeline.period(model.manifest, numbers.values)
     slowest = timeline.longest_harmonic(model.manifest, numbers.values)
     slowest = math.ceil(max(slowest, slowest_beat(model.manifest, numbers.values, MOST // 2 * turn)) / turn)
-    turns = timeline.whole_cycles(model.manifest, max(LEAST, slowest))
+    turns = timeline.whole_cycles(model.manifest, numbers.values, max(LEAST, slowest))
     if not (real(most) >= 2 * turns and float(most).is_integer()):
         why = f" The slowest harmonic load, or beat, takes {slowest} turns for a period." if slowest > LEAST else ""
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
-    transient = asked_transient(model, request.transient_cycles)
-    dropped = _dropped(transient, start_time(request.initial), turn)
-    run = resolve(model, numbers, replace(request, cycles=dropped + turns))
-    if timeline.changes_over_time(model.manifest, numbers.values, run.start, run.start + MOST * turn):
+    span = asked_span(model, numbers, replace(request, cycles=1.0))
+    if not repeats(model, numbers.values, span.start):
         raise RequestError(
             "settle: load, speed or slip of this scene follow a table or a window over time, so that its turns are "
             "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
             "are meant, without settle."
         )
+    run = resolve(model, numbers, request, span=span.counting(turns))
     going, counter, noise = start_reducing(run, channel_names(model.manifest)), _counter(model), tolerated(run)
     going.go_on()
     before, lost = going.take(), 0
     while True:
         turns *= 2
-        going.go_on(run.begin + (dropped + turns) * turn)
+        going.go_on(run.start + turns * turn)
         later = going.take()
         found = joined(before, later)
         assert found is not None
@@ -190,26 +189,19 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     SimulationError
         The longer run failed.
     """
-    model, turn = run.model, run.turn
+    model, turn = run.model, run.span.turning.turn
     if not repeats(model, run.numbers.values, run.start):
         return None
     if few is None:
         few = reduced(run)
     whole = (few.start + few.duration - run.begin) / turn
-    cycle = timeline.cycle_turns(model.manifest)
-    turns = min(timeline.whole_cycles(model.manifest, LEAST), int(STEPS * whole / max(few.steps, 1)))
+    cycle = timeline.cycle_turns(model.manifest, run.numbers.values)
+    least = timeline.whole_cycles(model.manifest, run.numbers.values, LEAST)
+    turns = min(least, int(STEPS * whole / max(few.steps, 1)))
     turns -= turns % cycle
     if turns < 2.0 * few.duration / turn:
         return None
-    request = Request(
-        cycles=_dropped(run.transient_cycles, run.begin, turn) + turns,
-        transient_cycles=run.transient_cycles,
-        method=run.method,
-        rtol=run.rtol,
-        kinks=run.kinks,
-        initial=RunEnd(time=run.begin, x=run.initial, states=model.states, parameters=run.numbers.parameters),
-    )
-    longer, counter = resolve(model, run.numbers, request), _counter(model)
+    longer, counter = replace(run, span=run.span.counting(turns), progress=None), _counter(model)
     going = start_reducing(longer, channel_names(model.manifest))
     going.go_on((longer.start + longer.end) / 2.0)
     early = going.take()
@@ -224,16 +216,11 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
 
 
 def repeats(model: LoadedModel, values: Mapping[str, float], begin: float) -> bool:
-    """Whether turns from a time on [s] are alike: no table gives the speed over time, or changes anything behind it."""
+    """Whether turns from a time on [s] are alike: something turns, and no table over time changes a value then."""
     turn = timeline.period(model.manifest, values)
-    if not math.isfinite(turn) or not timeline.one_speed(model.manifest, values):
+    if not math.isfinite(turn) or not math.isfinite(begin):
         return False
     return not timeline.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
-
-
-def _dropped(transient: float, begin: float, turn: float) -> float:
-    """Turns of the transient that a run from `begin` on has before it."""
-    return max(transient - begin / turn, 0.0)
 
 
 def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:

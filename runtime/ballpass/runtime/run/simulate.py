@@ -54,15 +54,15 @@ def simulate(
         The computation failed; the samples so far are in its attribute ``partial``.
     """
     started = clocks.perf_counter()
-    sampling = sampling_of(model, request, numbers.values)
+    sampling = sampling_of(model, request, numbers)
     # derivatives first: too many for the memory are refused before memory for the rest is allocated
     directions = prepare(len(sampling.times)) if prepare is not None else None
-    run = resolve(model, numbers, request, duration=sampling.duration, stepper=False)
+    run = resolve(model, numbers, request, span=sampling.span, stepper=False)
     if directions is not None:
         run = replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest))
         if request.sensitivity_rtol is not None:
             directions.control(tolerance("sensitivity_rtol", request.sensitivity_rtol), run.magnitude)
-    trajectory = start_trajectory(run, sampling)
+    trajectory, turn = start_trajectory(run, sampling), run.span.turning.turn
     channels = reduced_channels(model.manifest, sampling.outputs)
     layout = reduction_rows(model.manifest)
     rows = layout.empty(2, [run.start, 0.0], layout.all_of(channels), run.rtol)
@@ -96,7 +96,7 @@ def simulate(
             end=last,
             steps=trajectory.steps,
             rejected=trajectory.rejected,
-            turn=run.turn,
+            turn=turn,
         )
         for row in rows
     )
@@ -109,8 +109,8 @@ def simulate(
         outputs=evaluate_outputs(model, numbers, trajectory, sampling.outputs),
         parameters=numbers.parameters,
         constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
-        cycle_length=run.turn if math.isfinite(run.turn) else None,
-        transient_cycles=run.transient_cycles,
+        cycle_length=turn if math.isfinite(turn) else None,
+        transient_cycles=run.span.transient,
         manifest=model.manifest,
         statistics=_statistics(run, trajectory, going, clocks.perf_counter() - started),
         status=Status.DONE if failure is None else failure.status,

@@ -95,7 +95,7 @@ class Solution:
     x : states, shape (samples, states), in the order of the manifest
     outputs : output name to samples; at a breakpoint, the value after it
     parameters, constants : numbers of the run by name
-    cycle_length : time of one turn [s], where its speed changes at the initial one; None where nothing turns
+    cycle_length : time of one turn [s], where its speed changes behind its last row; None where nothing turns
     transient_cycles : turns from t = 0 on that `steady` leaves out
     manifest : names, units and descriptions
     statistics : how the solution came about
@@ -223,13 +223,13 @@ class Solution:
             return self
         if self.cycle_length is None:
             raise RequestError("Transient cycles are turns, and nothing turns in this run: set transient to 0.")
-        start = self.transient_cycles * self.cycle_length
+        start = timeline.driver(self.manifest, {**self.parameters, **self.constants}).after(self.transient_cycles)
         keep = self.t >= start * (1.0 - 1e-12)
         if np.count_nonzero(keep) < 2:
             last = self.t[-1] if len(self.t) else 0.0
             raise RequestError(
-                f"The run of {last / self.cycle_length:g} cycles lies within its {self.transient_cycles:g} transient "
-                f"cycles: nothing is left. Remedy: {longer_words(self.transient_cycles)}."
+                f"The run of {last:g} s lies within its {self.transient_cycles:g} transient cycles: nothing is left. "
+                f"Remedy: {longer_words(self.transient_cycles)}."
             )
         outputs = {name: samples[keep] for name, samples in self.outputs.items()}
         return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs, reductions=self.steady_reductions)
@@ -249,9 +249,11 @@ class Solution:
 
     @property
     def period(self) -> float | None:
-        """Period of the machine [s]; None where nothing turns, or the speed changes."""
-        even = timeline.is_even(self.manifest, {**self.parameters, **self.constants})
-        return self.cycle_length if even else None
+        """Time of a turn [s]; None where nothing turns, or its speed changes in the samples."""
+        values = {**self.parameters, **self.constants}
+        if timeline.is_free(self.manifest) or not len(self.t):
+            return None
+        return self.cycle_length if timeline.turns_evenly(self.manifest, values, float(self.t[0])) else None
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions.

@@ -23,12 +23,12 @@ from ballpass.runtime.contract.folders import refuse_full_disk, replaced
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.netcdf import seal
-from ballpass.runtime.run.request import Request, check_length, run_length
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import asked_span
 from ballpass.runtime.run.sampling import checked_rate
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution, Statistics, contents
 from ballpass.runtime.run.start import start_time
-from ballpass.runtime.time import timeline
 
 #: Numbers of the samples of a piece, 16 MB; in memory a few times as much is needed.
 PIECE = 2**21
@@ -50,11 +50,8 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
         The computation failed; the file is as it was.
     """
     rate = checked_rate(0.0 if request.sample_rate is None else request.sample_rate)
-    turn = timeline.period(model.manifest, numbers.values)
-    begin = start_time(request.initial)
-    length = run_length(model, request, turn)
-    check_length(begin + length, turn)
-    edges = _edges(model, request, path, rate, begin, begin + length, piece)
+    span = asked_span(model, numbers, request)
+    edges = _edges(model, request, path, rate, span.begin, span.end, piece)
     try:
         with replaced(path) as made:
             statistics = _write(model, numbers, request, made, rate, edges)

@@ -67,8 +67,8 @@ class Interrupted(Exception):
 
 def start_trajectory(run: Run, sampling: Sampling) -> Trajectory:
     """Memory for the samples of a run, and the segments they lie in."""
-    near = time_resolution(run.begin, run.end, run.turn)
-    check_count(run.model.manifest, run.numbers, run.duration, run.turn)
+    near = time_resolution(run.begin, run.end, run.stretch)
+    check_count(run.model.manifest, run.numbers, run.duration, run.stretch)
     segments = segments_of(run)
     stops = np.searchsorted(sampling.times, segments.times - near)
     stops[0], stops[-1] = 0, len(sampling.times)

@@ -42,7 +42,13 @@ def shaft_speed(manifest: Manifest, values: Values) -> float:
 
 
 def period(manifest: Manifest, values: Values) -> float:
-    """Time of one turn of driver or shaft [s], at its first speed; infinite when it stands or none exists."""
+    """Time of one turn of driver or shaft [s], behind the last row of a table of its speed; infinite when it stands or
+    none exists."""
+    return driver(manifest, values).turn
+
+
+def stretch(manifest: Manifest, values: Values) -> float:
+    """Time after which a run is cut, so that angles stay small: a turn at the first speed, infinite without one [s]."""
     speed = shaft_speed(manifest, values)
     return TURN / abs(speed) if speed != 0.0 else math.inf
 
@@ -72,6 +78,11 @@ def fastest(info: TurningInfo, values: Values) -> float:
 def mean_rates(manifest: Manifest, values: Values, begin: float, end: float) -> dict[str, float]:
     """Mean speeds over a span, by the parameters and constants that hold the first ones [rad/s]."""
     return _rates(manifest, values, lambda turning: turning.mean_rate(begin, end))
+
+
+def settled_rates(manifest: Manifest, values: Values) -> dict[str, float]:
+    """Speeds behind the last row, in the same way."""
+    return _rates(manifest, values, lambda turning: float(turning.rate[-1]))
 
 
 def highest_rates(manifest: Manifest, values: Values) -> dict[str, float]:
@@ -108,20 +119,41 @@ def one_speed(manifest: Manifest, values: Values) -> bool:
     return info is None or len({values[name] for name in info.speeds}) <= 1
 
 
+def turns_evenly(manifest: Manifest, values: Values, begin: float) -> bool:
+    """Whether no table changes the driver's speed behind a time [s]."""
+    info = driver_info(manifest)
+    rows = [] if info is None else _changing(info.times, info.speeds, values)
+    return all(last <= begin * (1.0 + TIME_RESOLUTION) for _, last in rows)
+
+
 def is_even(manifest: Manifest, values: Values) -> bool:
     """Whether the driver's speed is constant: no torque drives, and no table has rows of unlike speeds."""
     return not is_free(manifest) and one_speed(manifest, values)
 
 
-def cycle_turns(manifest: Manifest) -> int:
+def cycle_turns(manifest: Manifest, values: Values) -> int:
     """Turns of driver or shaft after which all loads over its angle repeat: two for a four-stroke engine."""
-    tables = () if manifest.mechanism is None else manifest.mechanism.turns
-    return math.lcm(1, *(turns for _, turns in tables))
+    if is_free(manifest):  # its tables are no inputs
+        return math.lcm(1, *(turns for _, turns in manifest.mechanism.turns)) if manifest.mechanism else 1
+    tables = (item for item in manifest.inputs if item.kind == "table" and item.turns > 1)
+    return math.lcm(1, *(repeats_after(item, values) for item in tables))
 
 
-def whole_cycles(manifest: Manifest, turns: int) -> int:
+def repeats_after(item: InputInfo, values: Values) -> int:
+    """Turns after which a table over an angle repeats: fewer than it has where its parts are alike."""
+    angles, heights = _knots(item, values)
+    least, whole = 1e-12 * float(np.max(np.abs(heights))), item.turns * TURN
+    for turns in range(1, item.turns):
+        moved = np.concatenate([angles, angles + turns * TURN])
+        apart = np.subtract(*(np.interp(moved + by * TURN, angles, heights, period=whole) for by in (0, turns)))
+        if item.turns % turns == 0 and np.max(np.abs(apart)) <= least:
+            return turns
+    return item.turns
+
+
+def whole_cycles(manifest: Manifest, values: Values, turns: int) -> int:
     """At least so many turns: as many as all loads repeat after, or several times that."""
-    cycle = cycle_turns(manifest)
+    cycle = cycle_turns(manifest, values)
     return cycle * math.ceil(turns / cycle)
 
 
@@ -344,8 +376,14 @@ def _changes(manifest: Manifest, values: Values) -> Iterator[tuple[float, float]
             jumps = times[(np.diff(slopes) != 0.0) & (times < NEVER)]
             yield from zip(jumps.tolist(), jumps.tolist(), strict=True)
         else:
-            changing = np.flatnonzero(np.diff(at) != 0.0)
-            yield from zip(times[changing].tolist(), times[changing + 1].tolist(), strict=True)
+            yield from _changing(names, heights, values)
+
+
+def _changing(names: tuple[str, ...], heights: tuple[str, ...], values: Values) -> list[tuple[float, float]]:
+    """Spans of time between rows of unlike values [s]."""
+    times, at = knots(names, values), np.array([values[name] for name in heights])
+    behind = np.flatnonzero(np.diff(at) != 0.0) if len(times) else np.zeros(0, dtype=int)
+    return list(zip(times[behind].tolist(), times[behind + 1].tolist(), strict=True))
 
 
 def _rows(manifest: Manifest, values: Values) -> Iterator[np.ndarray]:

@@ -107,7 +107,8 @@ class Turning:
         return cls(begin=begin, angle=angle, rate=rate, half=half)
 
     @property
-    def _is_even(self) -> bool:
+    def is_even(self) -> bool:
+        """Whether it turns at one rate."""
         return self.begin.size == 1 and not self.half[0]
 
     def times(self, multiple: int) -> Turning:
@@ -139,11 +140,63 @@ class Turning:
         angle = self.angle[k] + s * (self.rate[k] + s * self.half[k])
         return angle, self.rate[k] + 2.0 * s * self.half[k], 2.0 * self.half[k]
 
+    @property
+    def turn(self) -> float:
+        """Time of a turn at the rate behind the last piece [s]; infinite where it stands then."""
+        rate = float(self.rate[-1].real)
+        return TURN / abs(rate) if rate else math.inf
+
     def turns(self, begin: float, end: float) -> float:
         """Turns in a span, in either sense [1]."""
-        if self._is_even:
-            return abs(float(self.rate[0])) * (end - begin) / TURN
-        return float(np.sum(np.abs(np.diff(self.at(self._edges(begin, end))[0])))) / TURN
+        return (end - begin) / self.turn if self.is_even else self.turned(begin, end).real
+
+    def turned(self, begin: float, end: float) -> complex:
+        """The same, with its derivative as `STEP` has it."""
+        if self.is_even:
+            rate = complex(self.rate[0])
+            return (rate if rate.real > 0.0 else -rate) * (end - begin) / TURN
+        passed = np.diff(self.at(self._edges(begin, end))[0])
+        return complex(np.sum(np.where(passed.real < 0.0, -passed, passed))) / TURN
+
+    def after(self, turns: float, begin: float = 0.0) -> float:
+        """Time at which it has made so many turns since another time, in either sense [s]; infinite where it never has.
+
+        Examples
+        --------
+        >>> from ballpass.runtime.time.turning import TURN, Turning
+        >>> run_up = Turning.by_speeds(0.0, [0.0, 2.0], [0.0, TURN])  # to a turn a second in two
+        >>> run_up.after(0.25), run_up.after(3.0)
+        (1.0, 4.0)
+        """
+        if turns == 0.0:
+            return begin
+        if self.is_even:
+            return begin + turns * self.turn
+        last = max(begin, float(self.begin[-1]))
+        edges = self._edges(begin, last + (turns * self.turn if math.isfinite(self.turn) else 1.0))
+        places = self.at(edges)[0]
+        passed = np.concatenate([np.zeros(1), np.cumsum(np.abs(np.diff(places)))]) / TURN
+        k = int(np.searchsorted(passed, turns * (1.0 - 1e-15)))
+        if k == len(edges):
+            return math.inf
+        ahead = math.copysign(TURN * (turns - passed[k - 1]), places[k] - places[k - 1])
+        return float(self._when(float(places[k - 1]), np.array([ahead]), float(edges[k - 1]), float(edges[k]))[0])
+
+    def after_slope(self, time: float, begin: float) -> float:
+        """Derivative of the time at which as many turns have been made since another as at `time`, as `STEP` has it.
+
+        Raises
+        ------
+        RequestError
+            It stands then.
+        """
+        rate = abs(complex(self.at(time)[1]).real)
+        if rate == 0.0:
+            raise RequestError(
+                f"cycles: the driver stands at {time:.6g} s, where so many turns are made: parameters move that time "
+                "by leaps. Give a duration in seconds, or turns that end while it turns."
+            )
+        return -self.turned(begin, time).imag / STEP * TURN / rate
 
     def mean_rate(self, begin: float, end: float) -> float:
         """Over a span [rad/s]."""
@@ -171,7 +224,7 @@ class Turning:
             More than `MOST_TURNS` turns.
         """
         edges = [begin, end]
-        if self._is_even:  # of Python's numbers, which overflow without a word
+        if self.is_even:  # of Python's numbers, which overflow without a word
             angle_0, rate_0 = float(self.angle[0]), float(self.rate[0])
             places = [angle_0 + rate_0 * begin, angle_0 + rate_0 * end]
         else:
@@ -190,11 +243,11 @@ class Turning:
             found.append(self._when(angle, period * whole, left, right).clip(left, right))
         return np.unique(np.concatenate(found)) if len(found) > 1 else np.sort(found[0])  # clockwise they fall
 
-    def first_pass(self, angle: float, turns: int = 1) -> float | None:
-        """The first time from t = 0 on at which it passes an angle, modulo so many turns [s]; None without one."""
+    def first_pass(self, angle: float, turns: int = 1, begin: float = 0.0) -> float | None:
+        """The first time from another on at which it passes an angle, modulo so many turns [s]; None without one."""
         # from the last piece's begin on it turns at one rate
-        further = 1.5 * turns * TURN / abs(self.rate[-1]) if self.rate[-1] else 1.0
-        return next(iter(self.passes(angle, 0.0, float(self.begin[-1] + further), turns).tolist()), None)
+        further = 1.5 * turns * self.turn if self.rate[-1] else 1.0
+        return next(iter(self.passes(angle, begin, max(begin, float(self.begin[-1])) + further, turns).tolist()), None)
 
     def last_pass(self, angle: float, end: float, turns: int = 1) -> float | None:
         """The last time from t = 0 to `end` at which it does [s]; None without one."""
@@ -221,11 +274,12 @@ class Turning:
 
     def _edges(self, begin: float, end: float) -> np.ndarray:
         """The span, cut into parts in which the angle grows or falls."""
-        if self._is_even:
+        if self.is_even:
             return np.array([begin, end])
+        starts, half = self.begin.real, self.half.real
         with np.errstate(divide="ignore", invalid="ignore"):
-            back = self.begin - 0.5 * self.rate / self.half
-        edges = np.concatenate([self.begin[1:], back[(self.half != 0.0) & (back > self.begin)]])
+            back = starts - 0.5 * self.rate.real / half
+        edges = np.concatenate([starts[1:], back[(half != 0.0) & (back > starts)]])
         return np.unique(np.concatenate([[begin], edges[(begin < edges) & (edges < end)], [end]]))
 
 

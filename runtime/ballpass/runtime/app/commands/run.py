@@ -231,6 +231,7 @@ def _look_behind(
     from ballpass.runtime.app.transient_words import transient_words
     from ballpass.runtime.ask.peaks import run_of
     from ballpass.runtime.run.settle import look_further
+    from ballpass.runtime.time import timeline
 
     taken, parameters = solution.statistics, given["parameters"]
     growth, longer = None, None
@@ -252,7 +253,7 @@ def _look_behind(
             growth = model.growth(
                 **given,
                 duration=steady.start + steady.duration - taken.begin,
-                transient=steady.start / model.period(parameters),
+                transient=timeline.driver(model.manifest, model.numbers(parameters).values).turns(0.0, steady.start),
                 rtol=taken.rtol,
             )
     else:
@@ -260,7 +261,8 @@ def _look_behind(
         longer = look_further(model, numbers, solution)
         if longer is not None:
             own = run_of(model, numbers, solution)
-            own = replace(own, start=longer.reductions.start, transient_cycles=solution.transient_cycles)
+            counted = replace(own.span, start=longer.reductions.start, transient=solution.transient_cycles)
+            own = replace(own, span=counted)
             for words in transient_words(model, own, longer, asked=_said(length)):
                 warn(words)
     if growth is not None and growth.words:

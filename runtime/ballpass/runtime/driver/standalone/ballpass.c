@@ -216,10 +216,32 @@ static double time_of_turn(const double *values)
     return speed != 0.0 ? TURN / fabs(speed) : INFINITY;
 }
 
+/* Turns from t = 0 to a time; the time at which so many are made is put there where that is sooner. */
+static double turns_until(const double *values, double most, double *end)
+{
+    if (scene_driver >= 0 && scene_turnings[scene_driver].rows) {
+        schedule_turning driver = scene_turnings[scene_driver];
+        driver.live = -1; /* by its table, wherever an FMU's input has brought it */
+        return schedule_turns(&driver, values, most, end);
+    }
+    const double turn = time_of_turn(values);
+    if (most * turn < *end) *end = most * turn;
+    return *end / turn;
+}
+
+double ballpass_turns(const ballpass *s, double end) { return turns_until(s->run.values, INFINITY, &end); }
+
+double ballpass_after(const ballpass *s, double turns)
+{
+    double end = INFINITY;
+    turns_until(s->run.values, turns, &end);
+    return end;
+}
+
 ballpass_request ballpass_default(const ballpass *s)
 {
     ballpass_request asked = {0.0, scene_duration, scene_rtol, 0, -1};
-    if (scene_cycles > 0.0) asked.end = scene_cycles * time_of_turn(s->run.values);
+    if (scene_cycles > 0.0) asked.end = ballpass_after(s, scene_cycles);
     for (int k = 0; k < SCENE_METHODS; k++)
         if (!strcmp(scene_method, scene_methods[k])) asked.method = k;
     return asked;

@@ -63,6 +63,11 @@ int ballpass_drive(ballpass *simulation, double speed);
 /* Speed of the driver or shaft at the time reached [rad/s]; 0 where a torque drives, or nothing is turned. */
 double ballpass_driver_speed(const ballpass *simulation);
 
+/* Turns that driver or shaft makes from t = 0 to a time, in either sense; the time that it takes for so many, infinite where it never makes
+   them.  Where a torque drives, at its first speed. */
+double ballpass_turns(const ballpass *simulation, double time);
+double ballpass_after(const ballpass *simulation, double turns);
+
 /* The scene's run, of the parameters that are set. */
 ballpass_request ballpass_default(const ballpass *simulation);
 

@@ -174,9 +174,11 @@ static int simulate(const request *asked, ballpass *simulation)
 {
     double columns[1 + SCENE_STATES + SCENE_OUTPUTS];
     const double speed = scene_speed >= 0 ? ballpass_value(simulation, scene_speed) : 0.0, turn = speed != 0.0 ? TURN / fabs(speed) : INFINITY;
-    if (asked->cycles > 0.0 && !isfinite(turn)) return refuse("--cycles", "a number", "--duration T, for nothing turns in this model (its speed is zero).");
-    const double duration = asked->cycles > 0.0 ? asked->cycles * turn : asked->duration;
-    const double wished = isfinite(turn) ? rint((double)asked->samples * duration / turn) : (double)asked->samples;
+    const double duration = asked->cycles > 0.0 ? ballpass_after(simulation, asked->cycles) : asked->duration;
+    if (!isfinite(duration)) return refuse("--cycles", "a number", "--duration T, for nothing turns in this model, or not so often.");
+    /* where its speed changes the driver may be slow on the mean */
+    const double turns = fmax(duration / turn, ballpass_turns(simulation, duration));
+    const double wished = turns > 0.0 ? rint((double)asked->samples * turns) : (double)asked->samples;
     const ballpass_request run = {0.0, duration, asked->rtol, asked->method, asked->located};
     int answer = ballpass_start(simulation, &run);
     if (answer != BALLPASS_OK) return complain(simulation, answer);

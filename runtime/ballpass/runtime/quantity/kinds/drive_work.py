@@ -10,10 +10,11 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.quantity.location import moved_numbers
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, View
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.time.timeline import cycle_turns, is_even
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.span import Span
+from ballpass.runtime.time.timeline import along, cycle_turns, driver_info, is_free
+from ballpass.runtime.time.turning import STEP, TURN, Turning
 
 #: Part of a turn by which times miss it by rounding.
 _NEAR = 1e-9
@@ -22,38 +23,45 @@ _NEAR = 1e-9
 _LESS = 1e-6
 
 
-def whole_cycles(run: Run) -> tuple[float, float] | None:
+def whole_cycles(span: Span, cycle: int) -> tuple[float, float] | None:
     """Begin and end of the last whole turns that count [s]: as many as loads repeat after, or several times that.
 
-    They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what counts.
-    None where it holds none.
+    They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what counts;
+    where its speed changes they are all that counts.  None where it holds none.
     """
-    cycle = cycle_turns(run.model.manifest)
-    first, last = run.start / run.turn, run.end / run.turn
+    if not span.turning.is_even:
+        count = cycle * round(span.counted / cycle)
+        return (span.start, span.end) if count and abs(span.counted - count) < _NEAR * count else None
+    turn = span.turning.turn
+    first, last = span.start / turn, span.end / turn
     for end in (last, math.floor(last + _NEAR)):
         count = cycle * math.floor((end - first) / cycle + _NEAR)
         begin = end - count
         if count > 0 and min(abs(begin - first), abs(begin - round(begin))) < _NEAR * max(last, 1.0):
-            return begin * run.turn, end * run.turn
+            return begin * turn, end * turn
     return None
 
 
 def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
-    run, window = view.run, whole_cycles(view.run)
+    span, cycle = view.run.span, cycle_turns(view.manifest, view.numbers.values)
+    window = whole_cycles(span, cycle)
     if window is None:
         raise RequestError(
             f"{quantity.name}: the time that counts holds no whole turn of the driver, or as many as all loads repeat "
-            "after, from a whole turn on. Run longer."
+            "after, from a whole turn on; where its speed changes, it must hold whole turns alone. Run longer, or ask "
+            "for whole turns (cycles, transient)."
         )
+    if not span.turning.is_even:
+        return _of_changing_speed(view, quantity)
     (value, slope), kink = _mean_within(view, quantity, window), ""
-    if run.turns is None and run.end - window[1] < _NEAR * run.turn:
+    if span.asked is None and span.end - window[1] < _NEAR * span.turning.turn:
         # the turns end elsewhere at another speed, though the run does not
         turning = -window[1] / view.numbers.values[mechanism.speed] * view.slopes(mechanism.speed)
         last = view.channel(quantity)[0][np.argmax(view.nodes.t)]
         slope = slope + (last - value) / (window[1] - window[0]) * turning
-        fewer = whole_cycles(replace(run, end=run.end - _LESS * run.turn))
+        fewer = whole_cycles(replace(span, end=span.end - _LESS * span.turning.turn), cycle)
         other = None if fewer is None else _mean_within(view, quantity, fewer)[0]
         if other is None or abs(other - value) > _LESS * abs(value):
             kink = (
@@ -68,7 +76,7 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
 
 def _mean_within(view: View, quantity: Quantity, window: tuple[float, float]) -> tuple[float, Array]:
     """Mean of the channel over a window from edge to edge, and its derivative."""
-    nodes, near = view.nodes, _NEAR * view.run.turn
+    nodes, near = view.nodes, _NEAR * view.run.span.turning.turn
     within = (window[0] - near < nodes.t) & (nodes.t < window[1] + near)
     whole = replace(
         nodes,
@@ -78,11 +86,30 @@ def _mean_within(view: View, quantity: Quantity, window: tuple[float, float]) ->
     return replace(view, nodes=whole).mean(*view.channel(quantity))
 
 
-def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
-    if not is_even(manifest, values):
+def _of_changing_speed(view: View, quantity: Quantity) -> Estimate:
+    """Work over all that counts, in a turn of it."""
+    span, nodes, values = view.run.span, view.nodes, view.numbers.values
+    if view.directions and span.asked is None:
         raise RequestError(
-            f"{quantity.name}: the driver's speed changes in this scene, and its turns are not alike. Ask for "
-            "mean:drive_power, times the length of the run."
+            f"{quantity.name}: by a parameter that moves its turns the run would hold no whole ones. Ask for turns "
+            "(cycles), not for a time."
+        )
+    torque, slope = view.channel(quantity)
+    _, rate, growth = span.turning.held(nodes.t, nodes.t)
+    info = driver_info(view.manifest)
+    assert info is not None  # its speed changes
+    faster = growth[:, None] * nodes.slope
+    for column, moved in enumerate(moved_numbers(info, view.slopes)):
+        faster[:, column] += np.imag(Turning.of(info, along(values, moved)).at(nodes.t)[1]) / STEP
+    work, slopes = view.integral(torque * rate, slope * rate[:, None] + torque[:, None] * faster)
+    return Estimate(value=work / span.counted, slope=slopes / span.counted)
+
+
+def _check(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
+    if is_free(manifest):
+        raise RequestError(
+            f"{quantity.name}: a torque drives this scene, and its turns are not alike. Ask for mean:drive_power, "
+            "times the length of the run."
         )
 
 
