@@ -20,7 +20,7 @@ from ballpass.runtime.run.loop import Samples, start_run
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.segments import time_resolution
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, beside
 
 Array = NDArray[np.float64]
 
@@ -169,8 +169,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
 
 def _moved(angle: Array) -> Array:
     """How far an angle moves behind each sample, by less than half a turn; behind the last as behind the one before."""
-    moved = np.diff(angle, append=angle[-1:])
-    moved = (moved + np.pi) % TURN - np.pi  # angles come back after a turn
+    moved = beside(np.diff(angle, append=angle[-1:]))  # angles come back after a turn
     if len(moved) > 1:
         moved[-1] = moved[-2]
     return np.asarray(moved)

@@ -51,7 +51,7 @@ from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import Request, asked_length, tolerance
 from ballpass.runtime.run.resolve import Run, asked_transient
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, past
 
 Array = NDArray[np.float64]
 
@@ -311,7 +311,7 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities) 
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
     known = timeline.crank_angles(manifest, numbers.values, times)
-    angles = signals[state].value[order, 0] % TURN if state else known
+    angles = past(signals[state].value[order, 0]) if state else known
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

@@ -18,6 +18,7 @@ from ballpass.runtime.plot.style import (
     shade_windows,
     styled,
 )
+from ballpass.runtime.time.turning import past
 
 #: Part of the turns in the enlarged panel of ball loads, and part of the time below which high loads are rare.
 CLOSER, RARE = 1.0 / 16.0, 0.2
@@ -110,7 +111,7 @@ def _last_turns(record: Record, turns: int) -> tuple[Array, Array]:
     window = record.last_turns(turns)
     # the last sample repeats the first one's angle
     index = np.arange(window.start, window.stop - 1)
-    angle = np.degrees(record.crank_angle()[index]) % (360.0 * turns)
+    angle = np.degrees(past(record.crank_angle()[index], turns=turns))
     order = np.argsort(angle, kind="stable")
     return angle[order], index[order]
 

@@ -10,6 +10,7 @@ from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import Record
 from ballpass.runtime.plot.style import frame, new_figure, styled
+from ballpass.runtime.time.turning import past
 
 
 @styled
@@ -49,7 +50,7 @@ def peak_moment(record: Record) -> Figure:
         text += ". "
     when = f"At t = {record.t[sample] * 1e3:.4g} ms"
     if with_mechanism:
-        when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
+        when += f", crank angle {np.degrees(past(record.crank_angle()[sample])):.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
     title = record.title(f"{subject} at the {reason}") + (_between_samples(record) if with_bearing else "")
     frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.3, below=0.1)

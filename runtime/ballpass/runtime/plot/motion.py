@@ -26,6 +26,7 @@ from ballpass.runtime.plot.style import (
     new_figure,
     styled,
 )
+from ballpass.runtime.time.turning import past
 
 #: Points drawn between two samples where velocities are known: a resonance has only ten samples a period.
 _FINER = 8
@@ -147,7 +148,7 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
     angle = record.crank_angle(t)
     label = "an applied load acts"
     for start, end in record.load_windows():
-        inside = (angle - start) % (2.0 * np.pi) < end - start
+        inside = past(angle, start) < end - start
         look: dict[str, Any] = {"color": APPLIED, "linestyle": "-", "linewidth": 1.9}
         axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), label=label, **look)
         label = "_nolegend_"
@@ -310,9 +311,9 @@ def phase_portrait(record: Record) -> Figure:
                 **look,
             )
         count, mechanism = points.time.size, record.manifest.mechanism
-        angle = np.degrees(record.parameter(mechanism.start_angle)) if mechanism else 0.0
+        angle = record.parameter(mechanism.start_angle) if mechanism else 0.0
         what = "crank" if mechanism else "shaft"
-        text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
+        text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {np.degrees(past(angle)):g}°."
         if many:
             panels[1].set_title("stroboscopic points alone")
             panels[1].set_ylabel("velocity along x [mm/s]")

@@ -24,6 +24,7 @@ from ballpass.runtime.plot.bearing import LOAD_COLOURS, RING, draw_bearing
 from ballpass.runtime.plot.mechanism import BAR, MechanismView, draw_mechanism, view
 from ballpass.runtime.plot.record import Record
 from ballpass.runtime.plot.style import INK, SAND, SIGNAL, TITLE, new_figure, settings, shade_windows
+from ballpass.runtime.time.turning import past
 
 #: Pictures of a movie, and of these a second.
 PICTURES, RATE = 72, 12
@@ -132,7 +133,11 @@ def _draw(
     driver = "crank" if record.manifest.mechanism is not None else "shaft"
     axes.set_xlabel(f"{driver} angle [°]" if turning else "time [ms]")
     axes.axvline(across[sample], color=SIGNAL, linewidth=1.8)
-    now = f"{driver} angle {degrees[sample] % 360.0:.0f}°" if turning else f"t = {1e3 * record.t[sample]:.4g} ms"
+    now = (
+        f"{driver} angle {np.degrees(past(np.radians(degrees[sample]))):.0f}°"
+        if turning
+        else f"t = {1e3 * record.t[sample]:.4g} ms"
+    )
     figure.suptitle(record.title(record.manifest.title), x=0.02, y=0.985, **TITLE)
     figure.text(0.98, 0.945, now, ha="right", va="top", fontsize=9)
     figure.subplots_adjust(left=0.11, right=0.97, bottom=0.1, top=0.9, hspace=0.06, wspace=0.05)

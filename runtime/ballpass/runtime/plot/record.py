@@ -21,6 +21,7 @@ from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
 from ballpass.runtime.run.ball_angles import ball_angles, ball_angles_along
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, MechanismInfo
@@ -141,10 +142,9 @@ class Record:
         A load that acts all the turn has none, and none whose table takes several turns; nor have loads of which some
         act at any angle.
         """
-        full = 2.0 * np.pi
         edges = [(self.parameter(start), self.parameter(end)) for start, end in self.load_window_edges()]
-        found = tuple((first % full, first % full + (end - first) % full) for first, end in edges)
-        ends_alone = (end for _, end in found if not any((end - a) % full < b - a - 1e-9 for a, b in found))
+        found = tuple((float(past(first)), float(past(first) + past(end, first))) for first, end in edges)
+        ends_alone = (end for _, end in found if not any(past(end, a) < b - a - 1e-9 for a, b in found))
         return () if found and next(ends_alone, None) is None else found
 
     def load_window_edges(self) -> list[tuple[str, str]]:
@@ -273,19 +273,19 @@ class Record:
 
     def _over_driver_angle(self, name: str, t: float) -> float:
         """Gate or table of a force that no input holds, for the driver's angle is a state."""
-        full, angle = 2.0 * np.pi, float(self.crank_angle(np.array([t]))[0])
+        angle = float(self.crank_angle(np.array([t]))[0])
         windows = [item.windows[0] for item in self.manifest.inputs if item.name.startswith(f"border.{name}.")]
         if windows:
             edges = [(self.parameter(start), self.parameter(end)) for start, end in windows]
-            return float(any((angle - start) % full < (end - start) % full for start, end in edges))
+            return float(any(past(angle, start) < past(end, start) for start, end in edges))
         window = f"mechanism.forces.{name}.window"
         if f"{window}.rise" in self.solution.parameters:
             start, end, rise = (self.parameter(f"{window}.{key}") for key in ("start", "end", "rise"))
-            past, width = (angle - start) % full, (end - start) % full
-            return float(np.interp(past, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
+            ahead, width = past(angle, start), past(end, start)
+            return float(np.interp(ahead, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
         columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
         knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
-        return float(np.interp(angle, knots, values, period=full * dict(self.mechanism.turns).get(f"force.{name}", 1)))
+        return float(np.interp(angle, knots, values, period=TURN * dict(self.mechanism.turns).get(f"force.{name}", 1)))
 
     def spring_tension(self, label: str) -> Array | None:
         """Tension of a spring or stop between two points, (n,) [N]; None where it was not asked for."""

@@ -11,7 +11,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -45,7 +45,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
         if worst > 0.0 and moves:
             angle, worst = _refine(model, numbers, row, angle, TURN / ANGLES)
         if worst <= 0.0:
-            place = math.degrees(timeline.start_angle(model.manifest, numbers.values) + angle) % 360.0
+            place = math.degrees(past(timeline.start_angle(model.manifest, numbers.values) + angle))
             faults.append(
                 f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {place:.2f} deg "
                 f"({info.description}: margin {worst:.4g})."

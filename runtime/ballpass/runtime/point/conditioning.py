@@ -21,7 +21,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -97,7 +97,7 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
                 values = condition(matrices(near))
                 k = int(np.argmax(values))
                 angle, largest, reach = float(near[k]), float(values[k]), reach / FINE
-        found.append((largest, (timeline.start_angle(manifest, numbers.values) + angle) % TURN))
+        found.append((largest, float(past(timeline.start_angle(manifest, numbers.values) + angle))))
     (whole, whole_angle), (equal, equal_angle) = found
     if not equal <= BOUND:
         warnings.warn(

@@ -34,7 +34,7 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.equilibrium_newton import FIRST_STEP, SearchEnd, settle
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import check_length
-from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
+from ballpass.runtime.time.turning import ANGLE_RESOLUTION, beside, past
 
 Array = NDArray[np.float64]
 
@@ -280,11 +280,11 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
     turns = timeline.cycle_turns(model.manifest, numbers.values)
     ahead = angle - timeline.crank_angle(model.manifest, numbers.values, 0.0)
     if turning.fastest == 0.0:
-        if abs(math.remainder(ahead, TURN)) < ANGLE_RESOLUTION:
+        if abs(beside(ahead)) < ANGLE_RESOLUTION:
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
     if len(turning.begin) == 1:
-        return (math.copysign(1.0, turning.rate[0]) * ahead % (turns * TURN)) / abs(float(turning.rate[0]))
+        return float(past(math.copysign(1.0, turning.rate[0]) * ahead, turns=turns)) / abs(float(turning.rate[0]))
     passed = turning.first_pass(angle, turns)
     if passed is None:
         raise RequestError(

@@ -32,7 +32,7 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import past
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
@@ -276,7 +276,7 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, l
 def _angle(model: LoadedModel, values: Mapping[str, float], time: float) -> float:
     """Angle of driver or shaft within the turns after which loads repeat [rad]."""
     turns = timeline.cycle_turns(model.manifest, values)
-    return float(timeline.driver(model.manifest, values).at(time)[0] % (turns * TURN))
+    return float(past(timeline.driver(model.manifest, values).at(time)[0], turns=turns))
 
 
 def _knot(slope: str) -> str:

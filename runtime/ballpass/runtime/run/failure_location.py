@@ -14,7 +14,7 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.run.magnitudes import mass_matrix
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import beside, past
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,7 +74,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     for bearing, turned, deflections in zip(
         manifest.bearings, at_balls, ball_deflections(model, numbers, time, state), strict=True
     ):
-        angles = turned % TURN
+        angles = past(turned)
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
             found = FailureLocation(
@@ -112,7 +112,7 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     names, half = [info.name for info in manifest.states], len(manifest.states) // 2
     driver = names.index(manifest.mechanism.angle)
     edges = [
-        (abs(math.remainder(state[driver] - values[path], TURN)), row, path)
+        (abs(beside(state[driver], values[path])), row, path)
         for row, item in enumerate(manifest.inputs)
         if item.kind == "border"
         for window in item.windows

@@ -18,7 +18,7 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import beside
 
 #: Angles of driver and balls that differ by less are equal, up to the rounding of many turns [rad].
 SAME_ANGLE = 1e-9
@@ -102,7 +102,7 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
         )
         for one in (before, numbers)
     )
-    moved = np.abs((others - angles + math.pi) % TURN - math.pi)
+    moved = np.abs(beside(others, angles))
     if np.max(moved) > SAME_ANGLE * max(1.0, end.time / timeline.period(model.manifest, numbers.values)):
         balls = bearing_words("balls", model.manifest.bearings)
         what = "the driver" if moved[0] == np.max(moved) else balls

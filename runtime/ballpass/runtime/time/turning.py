@@ -292,6 +292,12 @@ def past(angle: Any, first: Any = 0.0, turns: int = 1) -> Any:
     return rest if ahead.dtype.kind != "c" else rest + 1j * ahead.imag
 
 
+def beside(angle: Any, other: Any = 0.0) -> Any:
+    """How far an angle is from another, less whole turns: by half a turn at most, in either sense."""
+    ahead = angle - other
+    return ahead - TURN * np.rint(ahead / TURN)
+
+
 def knots(names: tuple[str, ...], values: Values, word: str = "times", unit: str = "s") -> np.ndarray:
     """Values that increase, of the rows of a table.
 

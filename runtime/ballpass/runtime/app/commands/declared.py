@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -135,8 +134,7 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
             values[name] = _band(flag, text, option)
         else:
             value = read_value(flag, text, option.unit)
-            # the unit was written, so that a number of many turns is meant
-            values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
+            values[name] = _within_two_turns(value) if option.unit == "rad" else value
     for pair in (("cycles", "duration"), ("turns", "cycles"), ("turns", "duration"), ("crank_angle", "t")):
         if all(values.get(name) is not None for name in pair):
             both = " and ".join(kinds[name][1].flag(name) for name in pair)
@@ -328,3 +326,10 @@ def _progress(stages: Stages) -> Callable[..., None]:
         stages.fraction(fraction)
 
     return tell
+
+
+def _within_two_turns(angle: float) -> float:
+    """An angle whose unit was written, so that a number of many turns is meant [rad]."""
+    from ballpass.runtime.time.turning import TURN, past
+
+    return angle if abs(angle) <= 2.0 * TURN else float(past(angle, turns=2))

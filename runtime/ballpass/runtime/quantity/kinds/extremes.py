@@ -6,7 +6,6 @@ says so.  A peak of about the same derivative does not count, for example the sa
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from ballpass.runtime.quantity.passages import jumps_at
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import beside
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -42,9 +41,9 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
     jump = jumps_at(quantity.channel)
-    if jump is not None and abs(math.remainder(mark.value - jump, TURN)) < AT_JUMP:
+    if jump is not None and abs(beside(mark.value, jump)) < AT_JUMP:
         notes.append("the angle jumps there by a turn")
-        value = mark.value - math.remainder(mark.value - jump, TURN)
+        value = mark.value - float(beside(mark.value, jump))
         mark, slope = replace(mark, value=value, competing=()), np.zeros(view.directions)
     # the minimum over the most loaded balls is not an extreme of one ball
     ranked = kind == "min" and signal.value.shape[1] > 1 and quantity.ball is None
