@@ -37,6 +37,12 @@ def andrews(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return load(generate(ANDREWS, tmp_path_factory.mktemp("andrews")))
 
 
+def test_means_of_a_torque_that_is_given_need_no_step(andrews: Model) -> None:
+    """No step is taken for it, and where the driver is was read from the first one: a crash of the interpreter."""
+    found = andrews.quantities(["mean:drive_torque", "rms:drive_torque"])
+    assert [one.value for one in found.values()] == pytest.approx([0.033, 0.033], rel=1e-12)
+
+
 def test_andrews_squeezer_starts_with_the_published_accelerations(andrews: Model) -> None:
     """beta'' and beta'' + Theta'' of the IVP test set; at that place no other body accelerates."""
     assert andrews.evaluate(0.0)["driver.acceleration"] == pytest.approx(BETA, rel=1e-11)

@@ -208,7 +208,8 @@ class NodeLayer:
             found = states[:, self.model.states.index(angle)][back].reshape(times.shape)
             return np.asarray(found / TURN)
 
-        asked = None if timeline.is_even(manifest, run.numbers.values) else turned
+        # what follows from time alone does not see where a torque has brought the driver
+        asked = None if timeline.is_even(manifest, run.numbers.values) or (angle and layout.still) else turned
         if layout.still:
             return uniform_panels(layout.edges, run.stretch, asked)
         return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.stretch, asked)
