@@ -10,7 +10,8 @@ run with a looser tolerance gives their uncertainty.  The certificate compares e
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,6 +28,7 @@ from ballpass.runtime.certify.certificate import (
     compare,
 )
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
+from ballpass.runtime.certify.dimensions import BASES, Identity, identities, power
 from ballpass.runtime.certify.grazing import Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import (
@@ -44,6 +46,7 @@ from ballpass.runtime.quantity.grammar import default_quantities, quantities_of,
 from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
+from ballpass.runtime.quantity.records import Estimate, Quantity
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.run.direction_scales import ANGLE
@@ -57,6 +60,9 @@ Array = NDArray[np.float64]
 
 #: How much rougher panels of quadratures may be in the looser run beside.
 COARSER = 4.0
+
+#: A place at a time or a frequency, which a quantity has beside the parameters.
+_TIMED = re.compile(r"[\d.]\s*(s|Hz)")
 
 #: Relative change of speed and start that shows the noise of a run, and how often it is made [1].
 JITTER, JITTERED = 1e-7, 5
@@ -234,6 +240,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     check=check,
                 )
             )
+    whole = {info.name for info in manifest.parameters if any(power(info.unit, base) for base in BASES)} <= set(names)
     return SensitivityReport(
         scene=manifest.scene,
         quantities=tuple(value_of(item, found) for item, found in zip(quantities, course.estimates, strict=True)),
@@ -244,6 +251,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         },
         pairs=tuple(pairs),
         grazing=_grazing(model, numbers, course),
+        identities=tuple(_identities(run, quantities, course.estimates, pairs, units) if whole else ()),
         settings={
             "cycles": query.request.cycles,
             "duration": run.duration,
@@ -265,6 +273,24 @@ def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) ->
     if not names:
         raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
     return names
+
+
+def _identities(
+    run: Run,
+    quantities: Sequence[Quantity],
+    estimates: Sequence[Estimate],
+    pairs: Sequence[Sensitivity],
+    units: Mapping[str, str],
+) -> Iterator[Identity]:
+    """Those of smooth quantities, in the units in which nothing else than parameters has a dimension."""
+    count = len(pairs) // max(len(quantities), 1)
+    for row, (quantity, estimate) in enumerate(zip(quantities, estimates, strict=True)):
+        own = pairs[row * count : (row + 1) * count]
+        timed = run.span.asked is None or _TIMED.search(quantity.place) is not None
+        if not estimate.kink and all(pair.check.sides is None for pair in own):
+            terms = [(pair.parameter, pair.parameter_value, pair.derivative, pair.uncertainty or 0.0) for pair in own]
+            bases = [base for base in BASES if not (timed and base == "second")]
+            yield from identities(quantity.name, estimate.value, quantity.unit, terms, units, bases)
 
 
 def _difference_scales(run: Run, names: Sequence[str]) -> Array:

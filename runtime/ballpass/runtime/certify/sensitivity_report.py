@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from ballpass.runtime.certify.certificate import Check, Verdict
+from ballpass.runtime.certify.dimensions import Identity
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
@@ -96,6 +97,7 @@ class SensitivityReport(Reported):
     grazing : where the trajectory grazes a kink
     elements : kinds of the bearings' rolling elements
     settings : cycles, transient, method that ran, kinks, tolerances, steps
+    identities : of dimensions, where derivatives are by all parameters
 
     Examples
     --------
@@ -114,6 +116,7 @@ class SensitivityReport(Reported):
     pairs: tuple[Sensitivity, ...]
     grazing: tuple[Grazing, ...]
     settings: Mapping[str, Any]
+    identities: tuple[Identity, ...] = ()
     elements: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -178,6 +181,7 @@ class SensitivityReport(Reported):
                 "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
                 "quantities": [asdict(item) for item in self.quantities],
                 "sensitivities": [known | _facts(pair) for pair, known in pairs],
+                "identities": [asdict(one) | {"holds": one.holds} for one in self.identities],
                 "grazing": [
                     {name: value for name, value in asdict(item).items() if name != "bearing"} for item in self.grazing
                 ],
@@ -189,7 +193,8 @@ class SensitivityReport(Reported):
 
     def _fault(self) -> str:
         if not self.disagreements:
-            return ""
+            broken = [str(words) for words in _dimension_words(self.identities) if isinstance(words, Marked)]
+            return "\n".join([*broken, "Do not rely on these derivatives."]) if broken else ""
         first = self.disagreements[0]
         return (
             f"{len(self.disagreements)} of {len(self.pairs)} derivatives disagree with their second route, "
@@ -336,6 +341,7 @@ def _remarks(report: SensitivityReport) -> list[Words]:
         )
         for pair in report.disagreements
     ]
+    lines += _dimension_words(report.identities)
     if report.settings["method"] == NOT_INTEGRATED:
         lines.append("all follows from the driver's angle: nothing is integrated")
     elif report.settings["sensitivity_rtol"] is not None:
@@ -362,6 +368,29 @@ def _remarks(report: SensitivityReport) -> list[Words]:
         words = f" at {count}: a small change moves the motion over a kink there{more}"
         lines.append(Marked("grazing", "doubt", words))
         lines += [f"  {element_words(describe(items), report.elements)}" for items in places[:LISTED]]
+    return lines
+
+
+def _dimension_words(identities: Sequence[Identity]) -> list[Words]:
+    """Whether derivatives by all parameters agree with the unit of each quantity."""
+    lines: list[Words] = [
+        Marked(
+            "disagrees",
+            "bad",
+            f": the sum of power times parameter times derivative of {one.quantity} over {one.base} is "
+            f"{one.total:.9g}, and by its unit {one.expected:.9g}: {one.departure:.0e} of the largest term apart, "
+            f"{one.stated:.0e} stated",
+        )
+        for one in identities
+        if not one.holds
+    ]
+    if identities and not lines:
+        bases = ", ".join(dict.fromkeys(one.base for one in identities))
+        worst = max(identities, key=lambda one: one.departure)
+        lines.append(
+            f"units: over all parameters the derivatives add up as powers of {bases} ask, to {worst.departure:.0e} of "
+            f"the largest term ({worst.stated:.0e} stated)"
+        )
     return lines
 
 
