@@ -10,6 +10,7 @@ from threading import Timer
 
 import numpy as np
 import pytest
+from flow_differences import differences
 from scipy.stats import t as student
 
 from ballpass.runtime import Model, RequestError
@@ -17,6 +18,9 @@ from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, largest_e
 
 THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 RPM = math.tau / 60.0
+
+#: Time from ball to ball on the load line [s], at that speed [rad/s].
+PERIOD, SPEED = 0.05, 393.1540342298 * RPM
 
 
 @pytest.mark.long
@@ -36,6 +40,32 @@ def test_between_the_doublings_readings_take_two_values(rotor: Model) -> None:
     readings = found.up[1].states[:, found.row]
     assert np.min(np.abs(readings - twice.start[found.row])) < 1e-9
     assert "periodic 2" in str(found)
+
+
+@pytest.mark.parametrize("exponent", [True, False])
+def test_a_motion_that_contracts_and_turns_is_no_cycle_of_many_readings(rotor: Model, exponent: bool) -> None:
+    """Differences of a tight flow say stable; at 900 rpm the transient comes near to itself after nine readings."""
+    found = rotor.bifurcation("shaft.speed=900 rpm:2200 rpm:2", exponent=exponent)
+    for motion in (*found.up, *found.down):
+        assert motion.kind == "periodic 1"
+        period = PERIOD * SPEED / motion.value
+        flow = differences(rotor, {"shaft.speed": motion.value}, motion.states[-1], period, [1e-9, 1e-9, 3e-7, 3e-7])
+        size = np.max(np.abs(np.linalg.eigvals(flow)))
+        assert size < 1.0
+        assert motion.exponent is None or motion.exponent.mean == pytest.approx(math.log(size), abs=1e-5)
+        again = rotor.simulate(
+            duration=period, initial=motion.states[-1], parameters={"shaft.speed": motion.value}, outputs=[], rtol=1e-11
+        )
+        assert np.max(np.abs(again.x[-1] - motion.states[-1]) / again.statistics.magnitudes) < 1e-4
+    assert not found.apart
+
+
+@pytest.mark.parametrize("ends", ["0 um:10 um", "10 um:0 um"])
+def test_a_range_turned_round_is_read_at_the_same_times(rotor: Model, ends: str) -> None:
+    """At the states of the zero end no ball touches at the other one."""
+    found = rotor.bifurcation(f"bearing.clearance={ends}:2", readings=20, exponent=False)
+    assert found.every == "each time the cage of bearing turns by 1 ball pitch, balls renumbered by 1"
+    assert [one.kind for one in (*found.up, *found.down)] == ["periodic 1"] * 4
 
 
 @pytest.mark.long
@@ -70,7 +100,7 @@ def test_the_exponent_of_the_papers_press_is_that_of_the_multiplier_of_134_turns
     motion = found.up[-1]
     assert motion.exponent is not None
     assert motion.exponent.mean == pytest.approx(-1.7588, abs=2e-3)  # at 1e-7 it is -1.7506
-    assert motion.kind == "quasi-periodic"
+    assert motion.kind == "periodic 134"  # readings are 134 alone: by the places of the balls, as the motion contracts
     assert "balls or loads are elsewhere" in found.every
 
 
@@ -182,13 +212,23 @@ def test_kinds_of_motion_of_maps_that_are_known() -> None:
             if k == 399:
                 values, growth = [], []
         exponent = exponent_of(np.array(growth))
-        kinds.append(kind_of_motion(np.array(values), np.ones(1), exponent, forced=True))
+        kinds.append(kind_of_motion(np.array(values), np.ones(1), exponent, (), forced=True)[0])
     assert kinds == ["periodic 2", "periodic 4", "chaotic"]
     assert exponent.low < math.log(2.0) < exponent.high
     angles = np.arange(200) * (math.sqrt(5.0) - 1.0) * math.pi
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     assert period_of(circle, np.ones(2)) == 0
-    assert kind_of_motion(circle, np.ones(2), exponent_of(1e-3 * np.sin(angles)), forced=True) == "quasi-periodic"
+    neutral = exponent_of(1e-3 * np.sin(angles))
+    assert kind_of_motion(circle, np.ones(2), neutral, (), forced=True) == ("quasi-periodic", "")
+    contracts = exponent_of(np.sin(angles) - 1.0)
+    drifts = [0.25 + 7.0 / 134.0, 0.5]
+    assert kind_of_motion(circle, np.ones(2), contracts, drifts[1:], forced=False)[0] == "periodic 2"
+    assert kind_of_motion(circle, np.ones(2), contracts, drifts[:1], forced=False)[0] == "quasi-periodic"  # after 268
+    assert kind_of_motion(circle, np.ones(2), contracts, [math.pi - 3.0], forced=False)[0] == "quasi-periodic"
+    assert kind_of_motion(circle, np.ones(2), contracts, (), forced=True) == (
+        "undecided",
+        "more --settling, for the motion contracts and does not repeat yet",
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ seen from the accelerations at one state, now and a period later.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -24,6 +24,9 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import STEP, TURN, Turning
 
@@ -36,6 +39,9 @@ SAME = 1e-6
 #: Where in a range a period is compared beside its ends: the golden section, at which no ratio of speeds is one of
 #: small numbers because it is so at both ends [1].
 WITHIN_RANGE = 0.5 * (3.0 - math.sqrt(5.0))
+
+#: Moments of a motion at which the equations are compared.
+MOMENTS = 40
 
 #: Change of a phase that shows whether the equations depend on it [rad].
 NUDGE = 0.7
@@ -102,6 +108,15 @@ def refuse_changing(manifest: Manifest, values: Mapping[str, float], question: s
         )
 
 
+def sampled_turns(model: LoadedModel, parameters: Mapping[str, float], turns: float = 1.0) -> Solution:
+    """A run from the scene's start over so many turns, or a second where nothing turns, sampled at `MOMENTS`."""
+    numbers = model.numbers(parameters)
+    turn = timeline.period(model.manifest, numbers.values)
+    duration = turns * turn if math.isfinite(turn) else 1.0
+    times = np.linspace(0.0, duration, MOMENTS)
+    return simulate(model, numbers, Request(duration=duration, times=times, outputs=[], transient_cycles=0.0))
+
+
 def forcing_period(
     model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, turns: float | None
 ) -> ForcingPeriod:
@@ -160,27 +175,26 @@ def common_period(
     model: LoadedModel,
     parameters: Mapping[str, float],
     over: ParameterRange,
-    times: np.ndarray,
-    states: np.ndarray,
+    sampled: Callable[[Mapping[str, float]], Solution],
 ) -> ForcingPeriod:
     """The shortest period of the equations that holds over a range of one parameter.
 
     Parameters
     ----------
     parameters : overrides of others, SI
-    times, states : as for `forcing_period`
+    sampled : gives the motion with these overrides, as `sampled_turns`: at states of another one no ball may touch
 
     Raises
     ------
     RequestError
         As for `forcing_period` at both ends, or no period holds between them.
     """
-    first, last, within = (
-        model.numbers({**parameters, over.name: over.at(share)}) for share in (0.0, 1.0, WITHIN_RANGE)
-    )
-    ends = [forcing_period(model, numbers, times, states, None) for numbers in (first, last)]
+    shares = (0.0, 1.0, WITHIN_RANGE)
+    given = [{**parameters, over.name: over.at(share)} for share in shares]
+    judged = [(model.numbers(one), run.t, run.x) for one in given for run in (sampled(one),)]
+    ends = [forcing_period(model, *one, None) for one in judged[:2]]
     for found in ends:
-        if all(_checked(model, one, times, states, found).difference <= SAME for one in (first, last, within)):
+        if all(_checked(model, *one, found).difference <= SAME for one in judged):
             return found
     raise RequestError(
         f"{over.name}: at its first end {ends[0].words}, at its second {ends[1].words}: no period holds between. "

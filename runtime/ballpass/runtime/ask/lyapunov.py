@@ -9,8 +9,10 @@ its multipliers instead: a tangent that turns, or that grows elsewhere than it s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from scipy.stats import t as student
@@ -32,6 +34,9 @@ LONGEST = 200
 
 #: Readings that repeat, in shares of the magnitudes [1].
 REPEATED = 1e-4
+
+#: Distance of a drift from a fraction that it is [1].
+WHOLE = 1e-9
 
 #: Smallest growth of which there is a logarithm [1].
 TINY = float(np.finfo(float).tiny)
@@ -157,29 +162,49 @@ def strobe_with_tangents(
     return states[ALIGN:], flows
 
 
+def changes_after(states: np.ndarray, magnitude: np.ndarray, period: int) -> np.ndarray:
+    """What so many readings change, in shares of the magnitudes, shape (readings - period,)."""
+    return np.asarray(np.max(np.abs((states[period:] - states[:-period]) / magnitude), axis=1))
+
+
 def period_of(states: np.ndarray, magnitude: np.ndarray, longest: int = LONGEST) -> int:
     """Readings after which states are there again; 0 where they are more than `longest`."""
-    shares = states / magnitude
-    for period in range(1, min(longest, len(shares) // 2) + 1):
-        if np.max(np.abs(shares[period:] - shares[:-period])) < REPEATED:
+    for period in range(1, min(longest, len(states) // 2) + 1):
+        if np.max(changes_after(states, magnitude, period)) < REPEATED:
             return period
     return 0
 
 
-def kind_of_motion(states: np.ndarray, magnitude: np.ndarray, exponent: Exponent | None, *, forced: bool) -> str:
-    """Periodic, quasi-periodic, chaotic or undecided.
+def common_round(drifts: Collection[float]) -> int:
+    """Readings after which phases are there again that move by these parts of a round; 0 for more than `LONGEST`."""
+    near = [Fraction(drift).limit_denominator(LONGEST) for drift in drifts]
+    if any(abs(float(one) - drift) > WHOLE for one, drift in zip(near, drifts, strict=True)):
+        return 0
+    rounds = math.lcm(*(one.denominator for one in near))
+    return rounds if rounds <= LONGEST else 0
+
+
+def kind_of_motion(
+    states: np.ndarray, magnitude: np.ndarray, exponent: Exponent | None, drifts: Collection[float], *, forced: bool
+) -> tuple[str, str]:
+    """Periodic, quasi-periodic, chaotic or undecided; and what would decide.
 
     Parameters
     ----------
+    drifts : as for `exponent_of`: a motion that contracts repeats when all phases do, and not before
     forced : whether the equations are the same at each reading; if not, they have a second period of their own
     """
     period = period_of(states, magnitude)
-    if exponent is not None and exponent.low > 0.0:
-        return "chaotic"
-    if period and (exponent is None or exponent.high < 0.0):
-        return f"periodic {period}"
     if exponent is None:
-        return "undecided"
+        return (f"periodic {period}", "") if period else ("undecided", "the exponent, left out by --no-exponent")
+    if exponent.low > 0.0:
+        return "chaotic", ""
+    if exponent.high < 0.0 and not forced:
+        period = period or common_round(drifts)
+        return f"periodic {period}" if period else "quasi-periodic", ""
     if exponent.high < 0.0:
-        return "undecided" if forced else "quasi-periodic"
-    return "quasi-periodic" if exponent.half < NARROW else "undecided"
+        settling = "more --settling, for the motion contracts and does not repeat yet"
+        return (f"periodic {period}", "") if period else ("undecided", settling)
+    if not period and exponent.half < NARROW:
+        return "quasi-periodic", ""
+    return "undecided", "more --readings, for the interval of the exponent holds zero"

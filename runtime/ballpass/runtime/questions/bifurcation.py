@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
@@ -15,12 +14,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
-from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.show.progress import Progress, shown
@@ -33,17 +30,11 @@ if TYPE_CHECKING:
     from ballpass.runtime.ask.lyapunov import Exponent
     from ballpass.runtime.ask.parameter_range import ParameterRange
 
-#: Longest period of the equations that is taken between readings, in turns; else it is one turn.
-LONGEST_STROBE = 8.0
-
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
 
 #: Longest delay of an interrupt [s].
 PATIENCE = 0.2
-
-#: Moments at which the equations are compared.
-MOMENTS = 40
 
 Vary = Annotated[
     str,
@@ -82,12 +73,14 @@ class MotionAt:
     states : readings, shape (readings, states)
     exponent : largest Lyapunov exponent per reading; None where none was asked for
     kind : ``periodic n``, ``quasi-periodic``, ``chaotic`` or ``undecided``
+    open : what would decide an undecided one; "" for others
     """
 
     value: float
     states: np.ndarray
     exponent: Exponent | None
     kind: str
+    open: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -146,12 +139,22 @@ class Bifurcation(ShortRepr, Reported):
             found = ", ".join(f"{value / factor:.6g}" for value in self.apart[:8])
             more = f" and {len(self.apart) - 8} more" if len(self.apart) > 8 else ""
             said.append(f"Up and down differ at {found}{more} {unit}: several motions, or one not settled.")
+        for words, group in groupby(sorted((*self.up, *self.down), key=lambda one: one.open), key=lambda one: one.open):
+            if words:
+                places = sorted({one.value / factor for one in group})
+                listed = ", ".join(f"{value:.6g}" for value in places[:8])
+                more = f" and {len(places) - 8} more" if places[8:] else ""
+                said.append(
+                    f"Undecided at {listed}{more} {unit}. What decides: {words}; or ballpass section, which sees "
+                    "whether states lie on a curve."
+                )
         said.append("Regions hold at the values themselves, whose distance limits where one ends.")
         records = [
             {
                 "direction": name,
                 "value": motion.value,
                 "kind": motion.kind,
+                "open": motion.open,
                 "exponent": motion.exponent.mean if motion.exponent else None,
                 "exponent_half": motion.exponent.half if motion.exponent else None,
                 "readings": motion.states[:, self.row].tolist(),
@@ -229,6 +232,7 @@ def bifurcation(
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.lyapunov import kind_of_motion, largest_exponent
     from ballpass.runtime.ask.parameter_range import parameter_range
+    from ballpass.runtime.ask.strobe import strobe_of
     from ballpass.runtime.run.locating import refuse_jumps
 
     manifest = model.manifest
@@ -241,7 +245,7 @@ def bifurcation(
     overrides = dict(parameters or {})
     for end in (chosen.low, chosen.high):
         refuse_free_driver(manifest, model.numbers({**overrides, chosen.name: end}).values, "bifurcation")
-    step_of, every, drifts_of = _strobe(model, overrides, chosen)
+    strobe = strobe_of(model, overrides, chosen, "bifurcation")
     stopped, done = Event(), [0]
 
     def each() -> None:
@@ -254,21 +258,28 @@ def bifurcation(
         ThreadPoolExecutor(2) as pool,
     ):
 
+        def motion(given: Mapping[str, float], begin: np.ndarray | None, dropped: int) -> Arrays:
+            step = strobe.time(model, given)
+            return parts.once(
+                np.array([given[chosen.name], dropped, *([] if begin is None else begin)]),
+                partial(_motion, model, given, step, begin, readings, dropped, rtol, exponent, each),
+            )
+
         def sweep(order: np.ndarray) -> tuple[MotionAt, ...]:
             found, start = [], None
             for value in order.tolist():
                 given = {**overrides, chosen.name: value}
-                step = step_of(given)
+                step = strobe.time(model, given)
                 values = model.numbers(given).values
                 refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
-                states, flows, magnitude = parts.once(
-                    np.array([value, *([] if start is None else start)]),
-                    partial(_motion, model, given, step, start, readings, settling, rtol, exponent, each),
-                )
-                drifts = () if drifts_of is None else drifts_of(given)
+                states, flows, magnitude = motion(given, start, settling)
+                drifts = strobe.drifts(model, given)
+                settled = strobe.settled(model, given, states, magnitude, parts)
+                if settled is not None:  # readings that come to a periodic state are taken from there
+                    states, flows, magnitude = motion(given, settled, 0)
                 grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
-                kind = kind_of_motion(states, magnitude, grown, forced=drifts_of is None)
-                found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind))
+                kind, undecided = kind_of_motion(states, magnitude, grown, drifts, forced=strobe.period is not None)
+                found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind, open=undecided))
                 start = states[-1]
                 done[0] += 1
                 if tell is not None:
@@ -298,40 +309,11 @@ def bifurcation(
         state=state,
         unit=manifest.states[names.index(state)].unit,
         row=names.index(state),
-        every=every,
+        every=strobe.every,
         up=up,
         down=down,
         apart=apart,
     )
-
-
-def _strobe(
-    model: AnyModel, parameters: Mapping[str, float], vary: ParameterRange
-) -> tuple[Callable[..., float], str, Callable[..., Collection[float]] | None]:
-    """Time between readings, of overrides, and words for it; where that is no period of the equations, the parts of a
-    round by which phases move from reading to reading.
-    """
-    from ballpass.runtime.ask.forcing_period import common_period, phase_drifts
-
-    first = {**parameters, vary.name: vary.low}
-    turn = model.period(first)
-    if not math.isfinite(turn):
-        raise RequestError("bifurcation: nothing turns in this scene. Allowed: a driver or shaft that turns.")
-    run = model.simulate(
-        duration=turn, times=np.linspace(0.0, turn, MOMENTS), parameters=first, outputs=[], progress=False
-    )
-    try:
-        period = common_period(model, parameters, vary, run.t, run.x)
-    except RequestError:  # no common period: readings are taken each turn, and the report says so
-        period = None
-    if period is not None and period.time(model.numbers(first).values) <= LONGEST_STROBE * turn:
-        return (lambda given: period.time(model.numbers(given).values)), f"each time {period.words}", None
-
-    def drifts(given: Mapping[str, float]) -> Collection[float]:
-        return phase_drifts(model, model.numbers(given), run.t, run.x, model.period(given)).values()
-
-    words = bearing_words("once a turn, after which balls or loads are elsewhere", model.manifest.bearings)
-    return model.period, words, drifts
 
 
 def _motion(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ballpass.runtime.contract.defaults import BRANCH_RTOL
+from ballpass.runtime.contract.defaults import BRANCH_RTOL, DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
 from ballpass.runtime.contract.units import table_unit
@@ -40,9 +41,6 @@ REPEATS = 1e-6
 
 #: Segments where one fails; kicks along the direction that doubles the period, in shares of the magnitudes.
 SEGMENTS, KICKS = 8, (1e-3, 1e-2, 0.03, 0.1, 0.3)
-
-#: Moments at which the equations are compared.
-MOMENTS = 40
 
 Turns = Annotated[
     float | None,
@@ -101,7 +99,7 @@ class SteadyState(ShortRepr, Reported):
     contacts : which elements touch, in which order, within a period
     left : what a period changed before each iteration and after the last one, in shares of the states' magnitudes [1]
     segments : of multiple shooting
-    integrated : periods that the iterations integrated, the last of them without tangents
+    integrated : periods that the iterations integrated
     difference : of the accelerations a period apart, at one state, relative to them [1]
     over : the range of the branches' parameter, None for none
     branches : of states over that parameter; that of `start` first, then those of twice the period
@@ -167,7 +165,8 @@ class SteadyState(ShortRepr, Reported):
 
     def _without_newton(self) -> str:
         """Periods that a transient takes to come as near, by the largest multiplier."""
-        size, lessened = abs(self.multipliers[0]), self.left[-1] / self.left[0]
+        # runs come no nearer than their tolerance
+        size, lessened = abs(self.multipliers[0]), max(self.left[-1], DERIVATIVE_RTOL) / self.left[0]
         periods = math.log(lessened) / math.log(size) if 0.0 < size < 1.0 and 0.0 < lessened < 1.0 else 0.0
         return f"; a transient takes {periods:.0f} periods to come as near" if periods > self.integrated else ""
 
@@ -294,7 +293,7 @@ def steady(
     ('inner.x', (8,))
     """
     from ballpass.runtime.ask.contact_sequence import contact_sequence
-    from ballpass.runtime.ask.forcing_period import common_period, forcing_period, refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import common_period, forcing_period, refuse_free_driver, sampled_turns
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
@@ -308,13 +307,12 @@ def steady(
     refuse_free_driver(manifest, numbers.values, "steady")
     turn = model.period(given)
     with kept_parts(keep, model, given, ends, turns, transient) as parts, shown("shooting", progress) as tell:
-        sampled = _run(model, given, max(transient, 1.0) * turn if math.isfinite(turn) else 1.0, MOMENTS)
-        pick = np.linspace(0, len(sampled.t) - 1, MOMENTS).astype(int)
-        moments = sampled.t[pick], sampled.x[pick]
+        sample = partial(sampled_turns, model, turns=max(transient, 1.0))
+        sampled = sample(given)
         if ends is None or turns is not None:
-            period = forcing_period(model, numbers, *moments, turns)
+            period = forcing_period(model, numbers, sampled.t, sampled.x, turns)
         else:
-            period = common_period(model, given, ends, *moments)
+            period = common_period(model, given, ends, sample)
         length = period.time(numbers.values)
         shooting = Shooting(
             model=model,

@@ -1,0 +1,138 @@
+"""When states are read stroboscopically, and the periodic state to which readings come.
+
+In: a model, a range of a parameter or none.  Out: `Strobe`.
+
+Readings are a period of the equations apart, or a turn where that is long or there is none: balls or loads are then
+elsewhere each time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.ask.forcing_period import (
+    ForcingPeriod,
+    common_period,
+    forcing_period,
+    phase_drifts,
+    sampled_turns,
+)
+from ballpass.runtime.ask.kept_parts import KeptParts
+from ballpass.runtime.ask.lyapunov import REPEATED, changes_after, period_of
+from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.ask.shooting import Shooting
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.time import timeline
+
+#: Longest period of the equations that is taken between readings, in turns; else it is one turn.
+LONGEST_STROBE = 8.0
+
+#: Readings come to a state where changes fall to this share from their first third to their last; longest period of a
+#: state that is sought so, in readings.
+FALLS, LONGEST_SOUGHT = 0.8, 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strobe:
+    """When states are read.
+
+    Attributes
+    ----------
+    period : of the equations; None where readings are a turn apart, after which they are others
+    every : time between readings, in words
+    """
+
+    period: ForcingPeriod | None
+    every: str
+
+    def time(self, model: LoadedModel, parameters: Mapping[str, float]) -> float:
+        """Time between readings with these overrides [s]."""
+        values = model.numbers(parameters).values
+        return timeline.period(model.manifest, values) if self.period is None else self.period.time(values)
+
+    def drifts(self, model: LoadedModel, parameters: Mapping[str, float]) -> Collection[float]:
+        """Parts of a round by which phases of the equations move from reading to reading."""
+        if self.period is not None:
+            return ()
+        run, every = sampled_turns(model, parameters), self.time(model, parameters)
+        return phase_drifts(model, model.numbers(parameters), run.t, run.x, every).values()
+
+    def settled(
+        self,
+        model: LoadedModel,
+        parameters: Mapping[str, float],
+        states: np.ndarray,
+        magnitude: np.ndarray,
+        parts: KeptParts,
+    ) -> np.ndarray | None:
+        """The stable state to which readings come that do not repeat after one; None where none is seen.
+
+        A motion that contracts and turns looks like a cycle of many readings as it comes back near to earlier ones.
+        Newton's iteration from the last reading finds where it goes, and its multipliers say how fast.
+        """
+        repeats = period_of(states, magnitude)
+        if self.period is None or repeats == 1:
+            return None
+        for period in range(1, (repeats or LONGEST_SOUGHT + 1)):
+            changes = changes_after(states, magnitude, period)
+            third = len(changes) // 3
+            if repeats % period or (not repeats and not np.max(changes[-third:]) < FALLS * np.max(changes[:third])):
+                continue
+            shooting = Shooting(
+                model=model,
+                parameters=parameters,
+                period=self.period,
+                repeats=period,
+                segments=1,
+                magnitude=magnitude,
+                rtol=None,
+                over="",
+                parts=parts,
+            )
+            try:
+                found = shooting.solve(states[-1:])
+            except SimulationError:
+                continue
+            away = np.max(np.abs((states[::-period] - found.nodes[0]) / magnitude), axis=1)[::-1]
+            third = max(len(away) // 3, 1)
+            size = abs(found.multipliers[0])
+            # between the middles of these thirds a disturbance falls by its power of two thirds of the readings
+            falls = max(REPEATED, size ** (len(away) / 3.0) * np.max(away[:third]))
+            if size < 1.0 and np.max(away[-third:]) <= falls:
+                return np.asarray(found.nodes[0])
+        return None
+
+
+def strobe_of(
+    model: LoadedModel, parameters: Mapping[str, float], over: ParameterRange | None, question: str
+) -> Strobe:
+    """When states are read, over a range of a parameter or for these numbers alone.
+
+    Raises
+    ------
+    RequestError
+        Nothing turns.
+    """
+    first = parameters if over is None else {**parameters, over.name: over.low}
+    values = model.numbers(first).values
+    turn = timeline.period(model.manifest, values)
+    if not math.isfinite(turn):
+        raise RequestError(f"{question}: nothing turns in this scene. Allowed: a driver or shaft that turns.")
+    try:
+        if over is None:
+            run = sampled_turns(model, first)
+            period = forcing_period(model, model.numbers(first), run.t, run.x, None)
+        else:
+            period = common_period(model, parameters, over, lambda given: sampled_turns(model, given))
+    except RequestError:  # no common period: readings are taken each turn, and the report says so
+        period = None
+    if period is not None and period.time(values) <= LONGEST_STROBE * turn:
+        return Strobe(period=period, every=f"each time {period.words}")
+    words = bearing_words("once a turn, after which balls or loads are elsewhere", model.manifest.bearings)
+    return Strobe(period=None, every=words)
