@@ -91,6 +91,8 @@ NAMED: dict[str, dict[str, str]] = {
         "follow each other from 20.13 µm on": "20.12879 of test_steady.py",
         "at 20.2 µm is": "test_steady.py",
         "with a cage ratio of 3/8": "31.75 mm; test_steady.py",
+        "move by 0.15 at most": "`MOVED` of ask/continuation.py",
+        "where its 400 points are used up": "`POINTS` of ask/continuation.py",
         "10 to 25 µm it has used up its 400 points at 20.3 µm": "40 s of processor time, which no test repeats",
     },
     "docs/index.md": {

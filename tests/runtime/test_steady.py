@@ -79,6 +79,7 @@ def test_multipliers_are_those_of_the_state_that_is_given(make_model: Callable[.
         assert one.multipliers[0].real == pytest.approx(-1.28949, abs=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ends", ["0 um:10 um", "10 um:0 um"])
 def test_a_branch_over_clearance_begins_at_none(rotor: Model, ends: str) -> None:
     """At the states of the zero end no ball touches at the other one."""
@@ -143,11 +144,39 @@ def test_the_doubling_is_where_an_independent_solver_has_it_and_its_branch_is_fo
     assert "period doubling" in text
 
 
+def test_two_doublings_in_a_wide_range_are_both_found(rotor: Model) -> None:
+    """They are 7 rpm apart, steps of a fiftieth of the range 20."""
+    base, twice = rotor.steady(over="shaft.speed=1800 rpm:2400 rpm").branches
+    assert [point.kind for point in base.special] == ["period doubling", "period doubling"]
+    for point, printed in zip(base.special, (1961.146, 1968.185), strict=True):
+        assert point.value / RPM == pytest.approx(printed, abs=1e-3)
+        sizes = []
+        for aside in (-1e-5, 1e-5):
+            value = (1.0 + aside) * point.value
+            there = rotor.steady(parameters={"shaft.speed": value}, transient=20.0)
+            period = PERIOD * 393.1540342298 * RPM / value
+            flow = differences(rotor, {"shaft.speed": value}, there.start, period, [1e-9, 1e-9, 3e-7, 3e-7])
+            sizes.append(np.max(np.abs(np.linalg.eigvals(flow))) - 1.0)
+        assert sizes[0] * sizes[1] < 0.0
+    assert "meets the branch" in twice.ended
+
+
+@pytest.mark.long
+def test_doublings_of_a_winding_branch_are_all_found_and_each_curve_is_followed_once(rotor: Model) -> None:
+    found = rotor.steady(over="shaft.speed=1500 rpm:2500 rpm", parameters={"bearing.clearance": 10e-6}, transient=20.0)
+    base, *others = found.branches
+    doublings = [point.value / RPM for point in base.special if point.kind == "period doubling"]
+    assert doublings[-2:] == pytest.approx([2348.0851, 2369.4435], abs=1e-3)
+    assert 2 * len(others) == len(doublings) == 8
+    assert all("meets the branch" in other.ended for other in others)
+
+
 @pytest.mark.long
 def test_a_fold_is_where_runs_leave_the_branch(rotor: Model) -> None:
     (branch,) = rotor.steady(over="shaft.speed=5920 rpm:5950 rpm").branches
     (fold,) = branch.special
     assert fold.kind == "fold"
+    assert branch.ended.startswith("at the first end of the range")
     assert not branch.points[-1].stable
     went = []
     for away in (0.999, 1.001):

@@ -274,10 +274,12 @@ def bifurcation(
                 refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
                 states, flows, magnitude = motion(given, start, settling)
                 drifts = strobe.drifts(model, given)
-                settled = strobe.settled(model, given, states, magnitude, parts)
-                if settled is not None:  # readings that come to a periodic state are taken from there
-                    states, flows, magnitude = motion(given, settled, 0)
                 grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
+                if grown is None or grown.low <= 0.0:
+                    settled = strobe.settled(model, given, states, magnitude, parts)
+                    if settled is not None:  # readings that come to a periodic state are taken from there
+                        states, flows, magnitude = motion(given, settled, 0)
+                        grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
                 kind, undecided = kind_of_motion(states, magnitude, grown, drifts, forced=strobe.period is not None)
                 found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind, open=undecided))
                 start = states[-1]

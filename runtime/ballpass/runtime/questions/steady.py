@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.contact_sequence import ContactSequence
-    from ballpass.runtime.ask.continuation import SteadyBranch
+    from ballpass.runtime.ask.continuation import BranchPoint, SteadyBranch
     from ballpass.runtime.ask.parameter_range import ParameterRange
     from ballpass.runtime.ask.shooting import PeriodicState, Shooting
     from ballpass.runtime.run.solution import Solution
@@ -441,23 +441,29 @@ def _branches(
     shooting: Shooting, found: PeriodicState, over: ParameterRange, tell: Callable[[float], None] | None
 ) -> tuple[tuple[SteadyBranch, ...], tuple[str, ...]]:
     """The branch of a state, and those of twice the period at its doublings, each once."""
-    from ballpass.runtime.ask.continuation import LARGEST_STEP, doubled, follow
+    from ballpass.runtime.ask.continuation import ENDS, MEETS, doubled, follow
     from ballpass.runtime.ask.steady_report import early_end
 
     ends = (over.low, over.high)
     first = follow(shooting, found, ends[0], ends, progress=tell)
-    branches, notes, met = [first], [], list[float]()
-    if not first.ended.startswith("at the end"):
+    branches, notes = [first], []
+    if first.ended != ENDS[0]:
         notes.append(early_end(first, over))
-    for point in first.special:
-        near = LARGEST_STEP * abs(ends[1] - ends[0])
-        if point.kind != "period doubling" or any(abs(point.value - other) < near for other in met):
-            continue
+    left = [point for point in first.special if point.kind == "period doubling"]
+    while left:
+        point = left.pop(0)
         try:
-            branches.append(doubled(shooting, point, ends))
+            branch = doubled(shooting, point, ends)
         except SimulationError as error:
             notes.append(f"The branch of twice the period at {point.value:.6g} was not followed: {error}")
             continue
-        if branches[-1].ended.startswith("where it meets"):
-            met.append(branches[-1].points[-1].value)
+        branches.append(branch)
+        if branch.ended == MEETS and left:  # at another doubling, from which it would be followed back
+
+            def away(other: BranchPoint, last: BranchPoint = branch.points[-1]) -> float:
+                shares = (other.nodes - last.nodes) / shooting.magnitude
+                return float(np.hypot(np.linalg.norm(shares), (other.value - last.value) / (ends[1] - ends[0])))
+
+            nearest = min((point, *left), key=away)
+            left = [other for other in left if other is not nearest]
     return tuple(branches), tuple(notes)
