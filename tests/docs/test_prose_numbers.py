@@ -58,12 +58,15 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/howto/optimize.md": {
         "is least, 3685.164 N": "an independent program; test_optimize.py",
         "limits another quantity": "a statement",
+        "a sweep of 33 values comes first": "`SWEPT` of questions/optimize.py",
     },
     "docs/howto/fit.md": {
         "its 95 % interval": "`CONFIDENCE` of ask/fitting.py",
     },
     "docs/howto/sobol.md": {
         "are N (d + 2) members": "the base samples A and B, and one for each input",
+        "between 0 and 1, and": "what a share is",
+        "the interval is wider than 0.6": "`UNKNOWN` of questions/sobol.py",
     },
     "docs/howto/bifurcation.md": {
         "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",

@@ -43,6 +43,15 @@ def _bound(model: Model, truth: dict[str, float], output: str, noise: float, tim
     return np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
 
 
+def test_a_number_that_an_end_of_its_range_holds_is_warned_of(rotor: Model) -> None:
+    data = _data(rotor, {}, "inner.x", 1e-3, 1, np.arange(201) / 4e3)
+    within = rotor.fit(data, "load.force.x=150 N:250 N", starts=1, progress=False)
+    held = rotor.fit(data, "load.force.x=150 N:190 N", starts=1, progress=False)  # it is 196 N
+    assert held.numbers[0].held == "second"
+    assert any("held by the second end of its range" in words for words in held.report().warnings)
+    assert not any("held by" in words for words in within.report().warnings)
+
+
 @pytest.mark.long
 @pytest.mark.extreme
 def test_intervals_hold_the_truth_as_often_as_they_say_and_are_as_narrow_as_they_can_be(press: Model) -> None:

@@ -10,10 +10,12 @@ import pytest
 from scipy.optimize import rosen, rosen_der
 
 from ballpass.runtime import Model, QuantityFunction, RequestError
-from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes
+from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes, seen_from_both_sides
 from ballpass.runtime.ask.interior_point import minimize_by_ipopt
 from ballpass.runtime.ask.limits import read_limits
 from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
+
+CLEARANCE = "bearing.clearance=0 um:10 um"
 
 Search = Callable[[Callable[[np.ndarray], Plane], np.ndarray], BundleMinimum]
 searches = pytest.mark.parametrize("minimized", [minimize_by_planes, minimize_by_slsqp, minimize_by_ipopt])
@@ -40,6 +42,37 @@ def test_a_kink_in_two_variables_is_hit_from_any_start(minimized: Search) -> Non
         assert found.best.x == pytest.approx([0.3, 0.6], abs=1e-6)
         assert len(found.sides) > 1
         assert found.converged
+
+
+@pytest.mark.parametrize(
+    ("goal", "kind"),
+    [
+        (lambda x: (1.0 + 1e-3 * abs(x - 0.3), 1e-3 * np.sign(x - 0.3)), "kink"),  # slopes of opposite sign, small
+        (
+            lambda x: (1.0 + 2.0 * abs(x - 0.3) + 30.0 * (x - 0.3) ** 2, 2.0 * np.sign(x - 0.3) + 60.0 * (x - 0.3)),
+            "kink",
+        ),
+        (lambda x: (1.0 + 30.0 * (x - 0.3) ** 2, 60.0 * (x - 0.3)), "smooth"),
+        (lambda x: (1.0 + 0.1 * x + 0.4 * (x < 0.3), 0.1), "jump"),
+        (lambda x: (1.0 + abs(x - 0.3) + 0.4 * (x < 0.3), np.sign(x - 0.3)), "jump"),
+        (lambda x: (1.0 + x, 1.0), "smooth"),  # held by the end of the range
+    ],
+)
+@searches
+def test_both_sides_of_a_least_value_say_whether_it_is_a_kink_or_a_jump(
+    minimized: Search, goal: Callable[[float], tuple[float, float]], kind: str
+) -> None:
+    def evaluate(x: np.ndarray) -> Plane:
+        value, slope = goal(float(x[0]))
+        return Plane(x=x, values=np.array([value]), slopes=np.array([[float(slope)]]))
+
+    for start in (0.27, 0.9):
+        found = seen_from_both_sides(evaluate, minimized(evaluate, np.array([start])))
+        if kind != "jump" or start > 0.3:
+            assert found.kind == kind
+            assert len(found.sides) == (1 if kind == "smooth" else 2)
+        if kind == "jump" and start > 0.3:
+            assert abs(found.sides[0].values[0] - found.sides[1].values[0]) == pytest.approx(0.4, abs=1e-4)
 
 
 @searches
@@ -116,6 +149,45 @@ def test_a_candidate_without_a_run_is_none(rotor: Model) -> None:
     found = rotor.optimize("peak_ball_force", "load.force.x=100 N:10 MN:log", cycles=2, transient=1, starts=1)
     assert found.bounds == ("first",)
     assert found.converged
+
+
+def test_a_parameter_without_effect_is_said_to_have_none(rotor: Model) -> None:
+    found = rotor.optimize("max:load.x", CLEARANCE, cycles=2, transient=1, progress=False)
+    assert found.idle == ("bearing.clearance",)
+    assert found.bounds == ("",)
+    assert "Without effect on max:load.x" in str(found)
+    assert "verified" not in str(found)
+
+
+def test_a_sweep_over_one_range_comes_first_and_finds_the_valley_that_is_least(rotor: Model) -> None:
+    """Of the peak force near a resonance, against a sweep of 301 plain runs; what it takes is said before it begins."""
+    given, vary, said = {"bearing.clearance": 2e-6}, "shaft.speed=5700 rpm:5960 rpm", list[str]()
+    found = rotor.optimize(
+        "peak_ball_force", vary, parameters=given, starts=1, progress=lambda words, _done: said.append(words)
+    )
+    speeds = np.linspace(5700.0, 5960.0, 301) * np.pi / 30.0
+    table = {"shaft.speed": speeds, "bearing.clearance": np.full(301, 2e-6)}
+    swept = rotor.simulate_many(table, "peak_ball_force")["peak_ball_force"]
+    assert found.value < swept.min() < 1.001 * found.value
+    assert found.kinked
+    assert len(found.trace) < 40
+    assert said[0] == "33 runs without derivatives"
+    assert said[1].startswith("some 20 runs with derivatives, ")
+
+
+@pytest.mark.long
+def test_a_jump_is_told_from_a_kink_by_plain_runs_on_both_sides(rotor: Model) -> None:
+    given, turns = {"bearing.clearance": 2e-6}, {"cycles": 400, "transient": 390}
+    vary = "shaft.speed=5860 rpm:5900 rpm"
+    found = rotor.optimize("-peak_ball_force", vary, parameters=given, starts=1, progress=False, **turns)
+    assert (found.kind, found.kinked) == ("jump", False)
+    low, high = sorted(found.beside)
+    for speed, value in ((0.99999, low), (1.00001, high)):
+        run = rotor.quantities("peak_ball_force", parameters={**given, "shaft.speed": speed * found.x[0]}, **turns)
+        assert run["peak_ball_force"].value == pytest.approx(value, rel=5e-3)
+    assert high > 1.4 * low
+    assert "A jump" in str(found)
+    assert any("jumps at this point" in words for words in found.report().warnings)
 
 
 @pytest.mark.long

@@ -14,6 +14,7 @@ from scipy.stats.qmc import Sobol
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.ask import drawn_members
 from ballpass.runtime.ask.variance_shares import VarianceShare, variance_shares, wilson
+from ballpass.runtime.questions.sobol import _interval
 
 CLEARANCE = "bearing.clearance"
 
@@ -67,6 +68,21 @@ def test_the_estimates_are_those_of_scipy() -> None:
     ours = variance_shares(a, b, mixed, seed=1)
     assert [one.first for one in ours] == pytest.approx(theirs.first_order.ravel().tolist(), rel=1e-9)
     assert [one.total for one in ours] == pytest.approx(theirs.total_order.ravel().tolist(), rel=1e-9)
+
+
+def test_shares_of_few_members_are_printed_as_far_as_their_intervals_bear_them() -> None:
+    """Values of a few members that are ten times the others: first-order shares are estimated above total ones."""
+    random = np.random.default_rng(5)
+    parts = [random.standard_t(1.5, size=(16, 3)) for _ in range(2)]
+    mixed = [np.where(np.arange(3) == k, parts[1], parts[0]).prod(axis=1) for k in range(3)]
+    found = variance_shares(parts[0].prod(axis=1), parts[1].prod(axis=1), np.array(mixed), seed=1)
+    assert any(not 0.0 <= one.first <= min(one.total, 1.0) for one in found)
+    for one in (share.borne for share in found):
+        assert 0.0 <= one.first_low <= one.first <= one.first_high <= one.total_high <= 1.0
+        assert one.first_low <= one.total_low <= one.total <= one.total_high
+    assert _interval(1.83, -0.4, 2.5).startswith("not known")
+    assert _interval(0.502, 0.40, 0.61) == "0.5  (0.40 to 0.61)"
+    assert _interval(0.5024, 0.501, 0.504) == "0.502  (0.5010 to 0.5040)"
 
 
 def test_wilson_covers_the_share_in_95_percent_of_samples() -> None:

@@ -12,12 +12,12 @@ which is the slope from the other side.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
-#: First and largest half width of the box, and that at which the search is done; most evaluations.
+#: Usual half width of the first and largest box, and that at which the search is done; most evaluations.
 BOX, DONE, EVALUATIONS = 0.1, 1e-7, 300
 
 #: Planes within so many half widths of the best point are taken: a box is halved after a step to its edge [1].
@@ -26,8 +26,12 @@ NEAR = 4.5
 #: Share of the promised decrease that a step must give; planes kept; penalty of a violated constraint.
 ENOUGH, PLANES, PENALTY = 0.1, 24, 10.0
 
-#: Slopes that differ by more within this distance of the optimum are those of two sides of a kink [1].
-BESIDE, JUMP = 1e-5, 1e-2
+#: Distances from the optimum at which both sides of it are compared [1].
+BESIDE, NEARER = 1e-5, 1e-6
+
+#: What stays of a difference between the sides from the one distance to the other at a kink or a jump: at a smooth
+#: optimum a tenth does.  Smallest jump; smallest change of slope, in shares of the largest slope seen [1].
+STAYS, JUMP, CHANGE = 0.5, 1e-5, 1e-4
 
 #: Weight of a plane that takes part [1].
 TAKES_PART = 1e-3
@@ -65,6 +69,7 @@ class BundleMinimum:
     multipliers : of the constraints, shape (functions - 1,)
     trace : of all evaluations, in order
     converged : whether the box became small enough
+    kind : ``smooth``, ``kink`` or ``jump``, as both sides say (`seen_from_both_sides`)
     """
 
     best: Plane
@@ -72,12 +77,18 @@ class BundleMinimum:
     multipliers: np.ndarray
     trace: tuple[Plane, ...]
     converged: bool
+    kind: str = "smooth"
 
 
-def minimize_by_planes(evaluate: Callable[[np.ndarray], Plane], start: np.ndarray) -> BundleMinimum:
-    """Search within 0 to 1 in each variable; the functions are of the order of one."""
+def minimize_by_planes(evaluate: Callable[[np.ndarray], Plane], start: np.ndarray, box: float = BOX) -> BundleMinimum:
+    """Search within 0 to 1 in each variable; the functions are of the order of one.
+
+    Parameters
+    ----------
+    box : first and largest half width of the box
+    """
     best = evaluate(start)
-    seen, half = [best], BOX
+    seen, half = [best], box
     while half > DONE and len(seen) < EVALUATIONS:
         near = [one for one in seen if np.max(np.abs(one.x - best.x)) <= NEAR * half][-PLANES:]
         step, promised, _, _ = _program(best, near, half)
@@ -88,7 +99,7 @@ def minimize_by_planes(evaluate: Callable[[np.ndarray], Plane], start: np.ndarra
         then = evaluate(np.clip(np.round(best.x + step, 12), 0.0, 1.0))
         seen.append(then)
         if best.merit - then.merit >= ENOUGH * (best.merit - promised):
-            best, half = then, min(2.0 * half, BOX)
+            best, half = then, min(2.0 * half, box)
         else:
             if then.merit < best.merit:
                 best = then
@@ -96,11 +107,37 @@ def minimize_by_planes(evaluate: Callable[[np.ndarray], Plane], start: np.ndarra
     near = [one for one in seen if np.max(np.abs(one.x - best.x)) <= BESIDE]
     _, _, weights, multipliers = _program(best, near, BESIDE)
     sides = tuple(one for one, weight in zip(near, weights, strict=True) if weight > TAKES_PART)
-    if not sides or np.max(np.ptp([one.slopes[0] for one in sides], axis=0)) < JUMP:
-        sides = (best,)
     return BundleMinimum(
-        best=best, sides=sides, multipliers=multipliers, trace=tuple(seen), converged=len(seen) < EVALUATIONS
+        best=best, sides=sides or (best,), multipliers=multipliers, trace=tuple(seen), converged=len(seen) < EVALUATIONS
     )
+
+
+def seen_from_both_sides(evaluate: Callable[[np.ndarray], Plane], found: BundleMinimum) -> BundleMinimum:
+    """The same with its kind: what values and slopes a little way off on both sides, and nearer, have in common."""
+    best, slopes = found.best, np.array([one.slopes[0] for one in found.sides])
+    across = slopes[0] - slopes[np.argmin(slopes @ slopes[0])]  # the edge where two parts meet
+    held = not np.any(across) and np.any(found.multipliers > 0.0)  # by a constraint
+    # else the way down that one slope promises; an end of a range holds the others
+    ways = (across, slopes[0], np.ones_like(across))
+    along = np.where(np.abs(best.x - 0.5) < 0.5 - BESIDE, next(way for way in ways if np.any(way)), 0.0)
+    size = float(np.linalg.norm(along))
+    if held or not size:
+        return replace(found, sides=(best,))
+    points = [best.x + way * along / size for way in (-BESIDE, BESIDE, -NEARER, NEARER)]
+    planes = [evaluate(point) for point in points]
+    far, near = (_step_between(planes[k], planes[k + 1], along / size, best.x) for k in (0, 2))
+    largest = max(float(np.max(np.abs(one.slopes[0]))) for one in (*found.trace, *planes))
+    if abs(near[0]) > max(JUMP, STAYS * abs(far[0])):
+        return replace(found, sides=tuple(planes[2:]), kind="jump")
+    if near[1] > max(CHANGE * largest, STAYS * far[1]):
+        return replace(found, sides=found.sides if np.any(across) else tuple(planes[2:]), kind="kink")
+    return replace(found, sides=(best,))
+
+
+def _step_between(below: Plane, above: Plane, along: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+    """By how much value and slope at a point, as two planes have them, change from the one to the other."""
+    values = [float(one.values[0] + one.slopes[0] @ (x - one.x)) for one in (below, above)]
+    return values[1] - values[0], float((above.slopes[0] - below.slopes[0]) @ along)
 
 
 def _program(best: Plane, near: list[Plane], half: float) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:

@@ -227,6 +227,12 @@ class FitAnswer(ShortRepr, Reported):
                 f"Other values fit as well within the noise, SI: {listed}. The intervals do not reach to them. Give "
                 "narrower bounds, more data, or a part of the record that depends less on its start."
             )
+        warned += [
+            f"{one.name} is held by the {one.held} end of its range: the data ask for a number beyond it, and "
+            "others are fitted to that end. Give wider bounds, unless no such thing can be."
+            for one in self.numbers
+            if one.held
+        ]
         nothing = [one.name for one in self.signals if one.unexplained(len(self.numbers))]
         warned += [
             f"{name}: the differences are as large as the signal's own deviation about its mean, or larger. The model "

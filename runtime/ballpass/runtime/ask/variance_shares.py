@@ -45,6 +45,31 @@ class VarianceShare:
     total_high: float
     rows: int
 
+    @property
+    def borne(self) -> VarianceShare:
+        """The same within what shares can be: estimates from few members lie outside 0 and 1, or first above total.
+
+        Examples
+        --------
+        >>> clearance = "bearing.clearance=5 um:15 um"
+        >>> found = model.sobol(clearance, "rms:inner.y", cycles=3, samples=32)
+        >>> found.quantities[0].shares[0].borne.total_high
+        1.0
+        """
+        first, total = ((getattr(self, f"{kind}_low"), getattr(self, f"{kind}_high")) for kind in ("first", "total"))
+        total_high = float(np.clip(total[1], 0.0, 1.0))
+        first_low, first_high = np.clip(first, 0.0, total_high).tolist()
+        total_low = float(np.clip(total[0], first_low, total_high))
+        return VarianceShare(
+            first=float(np.clip(self.first, first_low, first_high)),
+            first_low=first_low,
+            first_high=first_high,
+            total=float(np.clip(self.total, total_low, total_high)),
+            total_low=total_low,
+            total_high=total_high,
+            rows=self.rows,
+        )
+
 
 def variance_shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray, seed: int) -> tuple[VarianceShare, ...]:
     """Shares of all inputs.

@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -19,17 +21,24 @@ from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.show.progress import shown_steps
 from ballpass.runtime.show.short import ShortRepr
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ballpass.runtime.ask.bundle import BundleMinimum
     from ballpass.runtime.ask.limits import Limit
     from ballpass.runtime.ask.parameter_range import ParameterRange
 
-#: Candidates for each start beside the corners of the ranges; they run in lanes.
-CANDIDATES = 8
+#: Candidates for each start beside the corners of the ranges; they run in lanes.  Values of a sweep over one range.
+CANDIDATES, SWEPT = 8, 33
+
+#: Runs with derivatives that a search takes, more or less: for what is said before it starts.
+EACH = 20
+
+#: Without effect is what changes the goal by a smaller share of it over its whole range, by all slopes seen [1].
+NOTHING = 1e-9
 
 #: Most tolerances: the corners of their box are all taken.  Of more ranges no corners are candidates.
 MOST_TOLERANCES = 6
@@ -89,7 +98,8 @@ Search = Annotated[
 Starts = Annotated[
     int,
     Option(
-        words="Starts: the best candidates that are apart, of eight for each and the corners of the bounds.",
+        words="Most starts: over one range the least values of a sweep that lie between larger ones; else the best "
+        "candidates that are apart, of eight for each and the corners of the bounds.",
         shown="N",
         least=1,
         most=100,
@@ -109,7 +119,10 @@ class Optimum(ShortRepr, Reported):
     vary : parameters and their bounds
     x : their values there, SI, shape (parameters,)
     bounds : "first", "second" or "" for each parameter: the end of its range that holds the optimum
-    slopes : of the goal by the parameters there, SI; several rows at a kink, one for each smooth part that meets there
+    slopes : of the goal by the parameters there, SI; several rows at a kink or jump, one for each part that meets there
+    kind : ``smooth``, ``kink`` where parts meet, or ``jump``: seen from both sides, and from nearer ones
+    beside : values of the goal on both sides of a jump, else empty [unit]
+    idle : parameters without effect on the goal
     limits : constraints
     verdicts : of the check of the slopes: parameter, verdict
     starts : where each search began and the value where it ended, SI: pairs of tuple and number
@@ -137,6 +150,9 @@ class Optimum(ShortRepr, Reported):
     x: np.ndarray
     bounds: tuple[str, ...]
     slopes: np.ndarray
+    kind: str
+    beside: tuple[float, ...]
+    idle: tuple[str, ...]
     limits: tuple[Limit, ...]
     verdicts: tuple[tuple[str, str], ...]
     starts: tuple[tuple[tuple[float, ...], float], ...]
@@ -158,7 +174,7 @@ class Optimum(ShortRepr, Reported):
         >>> model.optimize("rms:inner.y", clearance, cycles=3, starts=1).kinked
         False
         """
-        return len(self.slopes) > 1
+        return self.kind == "kink"
 
     @property
     def _most(self) -> str:
@@ -223,8 +239,15 @@ class Optimum(ShortRepr, Reported):
                 f"A kink: {len(self.slopes)} smooth parts meet here, and the goal "
                 f"{'falls' if self.largest else 'grows'} on each side. Slopes are those of the parts."
             )
-        checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts)
-        said.append(f"slopes {'beside the kink ' if self.kinked else ''}by a second route: {checked}")
+        if self.kind == "jump":
+            ends = " and ".join(f"{factor * value:.6g}" for value in self.beside)
+            said.append(f"A jump: on its two sides, as near as a millionth of the range, the goal is {ends} {unit}.")
+        if self.idle:
+            said.append(f"Without effect on {self.goal}, so that any value is as good: {', '.join(self.idle)}.")
+        checked = ", ".join(f"{name} {verdict}" for name, verdict in self.verdicts if name not in self.idle)
+        if checked:
+            beside = "" if self.kind == "smooth" else f"beside the {self.kind} "
+            said.append(f"slopes {beside}by a second route: {checked}")
         ends = ", ".join(
             f"{factor * end:.7g}{'' if kept else ' (a limit not kept)'}"
             for (_, end), kept in zip(self.starts, self.kept, strict=True)
@@ -242,6 +265,11 @@ class Optimum(ShortRepr, Reported):
         elif not self.converged:
             fault = "The search did not end by itself. Give more starts, narrower bounds, or another search: slsqp."
         warned = []
+        if self.kind == "jump":
+            warned.append(
+                f"{self.goal} jumps at this point, and is another one a little beside it. Give a tolerance, of which "
+                "the worst counts, or move the bounds off the jump."
+            )
         worse = (self.value - self.further) if self.largest else (self.further - self.value)
         if worse > WORSE * abs(self.value):
             warned.append(
@@ -251,7 +279,7 @@ class Optimum(ShortRepr, Reported):
         facts = {
             **self._named("goal", "unit", "largest", "value"),
             "parameters": rows,
-            "kinked": self.kinked,
+            **self._named("kinked", "kind", "beside", "idle"),
             "limits": [asdict(one) for one in self.limits],
             "verdicts": [list(pair) for pair in self.verdicts],
             "starts": [
@@ -294,7 +322,7 @@ def optimize(
     transient: Transient = None,
     parameters: Mapping[str, float] | None = None,
     keep: str | Path | None = None,
-    progress: Progress = None,
+    progress: Callable[[str, float], None] | bool | None = None,
 ) -> Optimum:
     """Find the least or largest value of a quantity over parameters, also where it has a kink.
 
@@ -305,7 +333,7 @@ def optimize(
     ----------
     parameters : overrides of other parameters, SI
     keep : folder for what is computed, by which a call that was killed continues; what it kept is deleted at the end
-    progress : as for `simulate`
+    progress : as for `simulate`, but a function is called with words as well: what the search takes, before it starts
 
     Raises
     ------
@@ -323,7 +351,7 @@ def optimize(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.bundle import minimize_by_planes
+    from ballpass.runtime.ask.bundle import BOX, minimize_by_planes, seen_from_both_sides
     from ballpass.runtime.ask.interior_point import minimize_by_ipopt
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.limits import read_limits
@@ -353,29 +381,45 @@ def optimize(
         parameters=parameters,
     )
     count = len(ranges)
-    shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
-    if count <= MOST_TOLERANCES:
-        shares = np.concatenate([shares, list(itertools.product((0.0, 1.0), repeat=count))])
-    minimized = {"planes": minimize_by_planes, "slsqp": minimize_by_slsqp, "ipopt": minimize_by_ipopt}[search]
+    shares = np.linspace(0.0, 1.0, SWEPT)[:, None]
+    if count > 1:
+        shares = Halton(count, scramble=False).random(CANDIDATES * starts + 1)[1:]  # the first is a corner
+        if count <= MOST_TOLERANCES:
+            shares = np.concatenate([shares, list(itertools.product((0.0, 1.0), repeat=count))])
+    within = partial(minimize_by_planes, box=1.0 / (SWEPT - 1) if count == 1 else BOX)
+    searches: dict[str, Callable[..., BundleMinimum]] = {"slsqp": minimize_by_slsqp, "ipopt": minimize_by_ipopt}
+    minimized = searches.get(search, within)
     with (
         kept_parts(keep, model, *worst.decides) as parts,
-        shown("searching", progress) as tell,
+        shown_steps("running candidates", progress) as tell,
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
         warnings.simplefilter("ignore", UnknownValueWarning)  # a candidate without values is none
-        found = []
-        for start in _apart(shares[np.argsort(worst.candidates(shares, parts), kind="stable")], starts):
-            found.append((start, minimized(lambda share: worst.plane(share, parts), start)))
+        if tell is not None:
+            tell(f"{len(shares)} runs without derivatives", 0.0)
+        merits = worst.candidates(shares, parts)
+        begun = _valleys(shares, merits) if count == 1 else _apart(shares[np.argsort(merits, kind="stable")], starts)
+        begun = begun[:starts]
+        plane = cache(lambda share: worst.plane(np.array(share), parts))
+        started = perf_counter()
+        plane(tuple(begun[0]))
+        runs = EACH * len(begun)
+        found: list[tuple[np.ndarray, BundleMinimum]] = []
+        words = f"some {runs} runs with derivatives, {max(runs * (perf_counter() - started), 0.1):.1g} s more or less"
+        for start in begun:
             if tell is not None:
-                tell(len(found) / (starts + 1))
+                tell(words, len(found) / (len(begun) + 1))
+            found.append((start, minimized(lambda share: plane(tuple(share)), start)))
         least = min((one for _, one in found), key=lambda one: one.best.merit)
+        least = seen_from_both_sides(lambda share: plane(tuple(share)), least)
         best, sizes = least.best, worst.sizes
         verdicts = worst.verdicts(least)
         deviations = worst.worst_deviations(best.x)
         nominal, further = float(best.values[0] * sizes[0]), math.nan
         if box:
             nominal, further = worst.without_deviations(best.x), worst.worst_of_further(best.x)
+    idle = np.max([np.abs(plane.slopes[0]) for _, one in found for plane in one.trace], axis=0) < NOTHING
     slopes = [side.slopes[0] * sizes[0] / worst.by_share(best.x) for side in least.sides]
     return Optimum(
         goal=goal,
@@ -384,8 +428,14 @@ def optimize(
         value=float(best.values[0] * sizes[0]),
         vary=ranges,
         x=worst.at(best.x),
-        bounds=tuple("first" if s < ACTIVE else "second" if s > 1.0 - ACTIVE else "" for s in best.x.tolist()),
+        bounds=tuple(
+            "first" if s < ACTIVE else "second" if s > 1.0 - ACTIVE else ""
+            for s in np.where(idle, 0.5, best.x).tolist()
+        ),
         slopes=np.array(slopes),
+        kind=least.kind,
+        beside=tuple(float(one.values[0] * sizes[0]) for one in least.sides) if least.kind == "jump" else (),
+        idle=tuple(one.name for one, none in zip(ranges, idle.tolist(), strict=True) if none),
         limits=tuple(
             replace(
                 one,
@@ -406,6 +456,13 @@ def optimize(
         nominal=nominal,
         further=further,
     )
+
+
+def _valleys(points: np.ndarray, merits: np.ndarray) -> np.ndarray:
+    """The points of a sweep that are less than those on both sides, the least first."""
+    beside = np.concatenate([[np.inf], merits, [np.inf]])
+    lowest = np.flatnonzero((merits < beside[2:]) & (merits <= beside[:-2]))
+    return points[lowest[np.argsort(merits[lowest], kind="stable")]]
 
 
 def _apart(points: np.ndarray, count: int) -> np.ndarray:

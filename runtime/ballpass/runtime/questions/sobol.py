@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 #: Differences below this share of a value are rounding [1].
 ROUNDING = 1e-12
 
+#: Of a share whose interval is wider no digit is given [1].
+UNKNOWN = 0.6
+
 #: Quantiles in the report.
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -197,7 +200,8 @@ class SobolAnswer(DrawnAnswer):
         parts.append(ReportTable(title=f"{self.members} members", heads=heads, rows=rows, right=right))
         records = []
         for one in self.quantities:
-            ranked = sorted(zip(self.inputs, one.shares, strict=False), key=lambda pair: -pair[1].total)
+            borne = [share.borne for share in one.shares]
+            ranked = sorted(zip(self.inputs, borne, strict=False), key=lambda pair: -pair[1].total)
             shares = ("total share", "first-order share")
             cells = [
                 (name, _interval(s.total, s.total_low, s.total_high), _interval(s.first, s.first_low, s.first_high))
@@ -207,7 +211,7 @@ class SobolAnswer(DrawnAnswer):
                 title = f"Shares in the variance of {one.name}, with 95 % intervals"
                 caption = (
                     "Total: what is left of the variance where all other inputs are known. First-order: what it loses "
-                    "where this one is known."
+                    "where this one is known. Not known: the interval leaves no digit; take more samples."
                 )
                 parts.append(ReportTable(title=title, heads=("input", *shares), rows=cells, caption=caption))
             records += [{"quantity": one.name, "input": name, **asdict(s)} for name, s in ranked]
@@ -237,7 +241,11 @@ class SobolAnswer(DrawnAnswer):
 
 
 def _interval(value: float, low: float, high: float) -> str:
-    return f"{value:6.3f}  ({low:.3f} to {high:.3f})"
+    """A share with the digits that its interval bears: in the last one the interval is ten wide or less."""
+    if not high - low <= UNKNOWN:
+        return f"not known  ({low:.2f} to {high:.2f})"
+    digits = int(np.clip(math.ceil(-math.log10(max(high - low, 1e-300))), 1, 3))
+    return f"{value:.{digits}f}  ({low:.{digits + 1}f} to {high:.{digits + 1}f})"
 
 
 def _figures(_model: AnyModel, found: SobolAnswer, _parameters: object) -> Iterator[tuple[str, Figure]]:
@@ -245,7 +253,7 @@ def _figures(_model: AnyModel, found: SobolAnswer, _parameters: object) -> Itera
 
     for k, one in enumerate(found.quantities):
         name = "sobol" if k == 0 else f"sobol_{k + 1}"
-        yield name, draw_shares(one.name, one.unit, found.inputs, one.shares, found.values[:, k])
+        yield name, draw_shares(one.name, one.unit, found.inputs, [s.borne for s in one.shares], found.values[:, k])
 
 
 def _varies(values: np.ndarray) -> bool:
