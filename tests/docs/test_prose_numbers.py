@@ -79,6 +79,8 @@ NAMED: dict[str, dict[str, str]] = {
         "and `periodic 134` is said from any number": "test_bifurcation.py",
         "ratio 409/1072) repeats after 134 turns only": "(1 - 7.9375/33.5)/2; test_steady.py",
         "In Fig. 7 of the paper": "the paper's figure",
+        "`motion` is the name": "test_section.py",
+        "`periodic 134` here": "test_section.py",
         "clearance of 40 µm the paper's press is chaotic: +4.2 a turn": "ADR 0032",
         "40 µm lies in a periodic window within": "test_bifurcation.py",
         "−0.297, and +1.6 at 39.9 µm": "ADR 0032",

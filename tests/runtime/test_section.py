@@ -33,7 +33,7 @@ def test_a_curve_that_is_known_is_found_and_noise_is_none() -> None:
 
 def test_at_bottom_dead_centre_the_press_of_the_paper_lies_on_a_curve_that_another_run_meets(press: Model) -> None:
     found = press.section(at=270.0, readings=200, settling=30)
-    assert found.kind == "on a closed curve"
+    assert (found.kind, found.motion) == ("on a closed curve", "periodic 134")
     assert found.curve is not None
     # balls that pass the outer ring in a turn: 8 times 409/1072
     assert found.curve.drift == pytest.approx(8.0 * 409.0 / 1072.0 - 3.0, abs=1e-9)
@@ -50,6 +50,28 @@ def test_points_of_a_press_whose_turn_is_a_period_repeat(press: Model) -> None:
     assert found.kind == "repeats after 1 turn"
     assert found.curve is None
     assert "repeats after 1 turn" in str(found)
+
+
+@pytest.mark.parametrize(("speed", "name"), [(900.0, "periodic 1"), (1965.0, "periodic 2")])
+def test_a_motion_has_the_name_that_bifurcation_gives_it(rotor: Model, speed: float, name: str) -> None:
+    """Read each ball pitch it repeats; read once a turn, its points lie on a curve or on none."""
+    found = rotor.section(parameters={"shaft.speed": speed * math.tau / 60.0})
+    values = f"shaft.speed={speed} rpm:{speed + 0.01} rpm:2"
+    diagram = rotor.bifurcation(values, settling=1000, readings=20, exponent=False)
+    assert (found.motion, found.every) == (diagram.up[0].kind, diagram.every)
+    assert found.motion == name
+    assert f"Motion: {name}, read each time" in " ".join(str(found).split())
+
+
+@pytest.mark.long
+def test_a_motion_of_two_periods_has_one_name(make_model: Callable[..., Model]) -> None:
+    model = make_model("rotor")
+    for pitch, name in ((33.5e-3, "periodic 134"), (31.4159265e-3, "quasi-periodic")):
+        given = {"bearing.pitch_diameter": pitch}
+        found = model.section(parameters=given)
+        diagram = model.bifurcation("bearing.clearance=0 um:10 um:2", parameters=given)
+        assert {one.kind for one in (*diagram.up, *diagram.down)} == {name}
+        assert (found.motion, found.every) == (name, diagram.every)
 
 
 @pytest.mark.long

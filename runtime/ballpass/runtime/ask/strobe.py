@@ -22,12 +22,13 @@ from ballpass.runtime.ask.forcing_period import (
     sampled_turns,
 )
 from ballpass.runtime.ask.kept_parts import KeptParts
-from ballpass.runtime.ask.lyapunov import REPEATED, changes_after, period_of
+from ballpass.runtime.ask.lyapunov import REPEATED, changes_after, common_round, period_of
 from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.ask.shooting import Shooting
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.time import timeline
 
 #: Longest period of the equations that is taken between readings, in turns; else it is one turn.
@@ -35,7 +36,10 @@ LONGEST_STROBE = 8.0
 
 #: Readings come to a state where changes fall to this share from their first third to their last; longest period of a
 #: state that is sought so, in readings.
-FALLS, LONGEST_SOUGHT = 0.8, 8
+FALLS, LONGEST_SOUGHT = 0.95, 4
+
+#: Readings by which a motion is named whose points are others.
+READ = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,8 +74,10 @@ class Strobe:
         states: np.ndarray,
         magnitude: np.ndarray,
         parts: KeptParts,
-    ) -> np.ndarray | None:
-        """The stable state to which readings come that do not repeat after one; None where none is seen.
+    ) -> tuple[int, np.ndarray] | None:
+        """The stable state to which readings come that do not repeat after one, and after how many it repeats.
+
+        None where none is seen.
 
         A motion that contracts and turns looks like a cycle of many readings as it comes back near to earlier ones.
         Newton's iteration from the last reading finds where it goes, and its multipliers say how fast.
@@ -105,8 +111,32 @@ class Strobe:
             # between the middles of these thirds a disturbance falls by its power of two thirds of the readings
             falls = max(REPEATED, size ** (len(away) / 3.0) * np.max(away[:third]))
             if size < 1.0 and np.max(away[-third:]) <= falls:
-                return np.asarray(found.nodes[0])
+                return period, found.nodes[0]
         return None
+
+    def name_of(
+        self, model: LoadedModel, parameters: Mapping[str, float], run: Solution, begin: float, *, follows: bool
+    ) -> str:
+        """Name of the motion of a run that `sample_times` are among the times of, as `kind_of_motion` gives it.
+
+        Parameters
+        ----------
+        begin : from which time on readings count [s]
+        follows : whether the state at an angle is a function of where the balls stand
+        """
+        if self.period is None:
+            rounds = common_round(self.drifts(model, parameters))
+            return "undecided" if not follows else f"periodic {rounds}" if rounds else "quasi-periodic"
+        times = self.sample_times(model, parameters, begin, float(run.t[-1]))
+        states, magnitude = run.x[np.searchsorted(run.t, times)], np.array(run.statistics.magnitudes)
+        found = self.settled(model, parameters, states, magnitude, KeptParts(None, ())) if model.has_stepper else None
+        repeats = found[0] if found is not None else period_of(states, magnitude)
+        return f"periodic {repeats}" if repeats else "undecided"
+
+    def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
+        """Times between two others at which states are read, the last `READ` of them [s]."""
+        step = self.time(model, parameters)
+        return step * np.arange(math.ceil(begin / step), math.floor(end / step) + 1)[-READ:]
 
 
 def strobe_of(

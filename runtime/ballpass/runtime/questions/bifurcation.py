@@ -278,7 +278,7 @@ def bifurcation(
                 if grown is None or grown.low <= 0.0:
                     settled = strobe.settled(model, given, states, magnitude, parts)
                     if settled is not None:  # readings that come to a periodic state are taken from there
-                        states, flows, magnitude = motion(given, settled, 0)
+                        states, flows, magnitude = motion(given, settled[1], 0)
                         grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
                 kind, undecided = kind_of_motion(states, magnitude, grown, drifts, forced=strobe.period is not None)
                 found.append(MotionAt(value=value, states=states, exponent=grown, kind=kind, open=undecided))

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from ballpass.runtime.contract.defaults import SECTION_RTOL
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
@@ -73,6 +72,7 @@ class PoincareSection(ShortRepr, Reported):
     period : turns after which points repeat; 0 where they do not
     curve : fitted over `phase`; None where points repeat, or where more turns than one cage
     others : what turns at a rate of its own besides
+    motion, every : name of the motion as `bifurcation` gives it, and the time between its readings in words
 
     Examples
     --------
@@ -93,6 +93,8 @@ class PoincareSection(ShortRepr, Reported):
     period: int
     curve: InvariantCurve | None
     others: tuple[str, ...]
+    motion: str
+    every: str
 
     @property
     def often(self) -> str:
@@ -160,7 +162,7 @@ class PoincareSection(ShortRepr, Reported):
             right=("least", "largest", "off curve")[: 3 if fitted else 2],
             wrapped=("what",),
         )
-        parts: list[str | ReportTable] = [table]
+        parts: list[str | ReportTable] = [table, f"Motion: {self.motion}, read {self.every}."]
         if self.curve is not None:
             drift = self.curve.drift
             around = f", so that they go round once in {self.turns / abs(drift):.4g} turns" if drift else ""
@@ -172,8 +174,8 @@ class PoincareSection(ShortRepr, Reported):
             )
         if self.kind == "on a closed curve":
             parts.append(
-                f"Within {100.0 * ON_CURVE:g} % the state follows the rolling elements: quasi-periodic. Few points of "
-                "such a curve look like separate parts."
+                f"Within {100.0 * ON_CURVE:g} % the state follows the rolling elements. Few points of such a curve "
+                "look like separate parts."
             )
         elif self.kind == "on no smooth curve":
             parts.append(
@@ -181,7 +183,7 @@ class PoincareSection(ShortRepr, Reported):
                 "or another angle (at); the Lyapunov exponent of ballpass bifurcation says whether it is chaotic."
             )
         facts = {
-            **self._named("angle", "turns", "around", "others", "kind", "period"),
+            **self._named("angle", "turns", "around", "others", "kind", "period", "motion", "every"),
             "drift": self.curve.drift if self.curve is not None else None,
             "harmonics": self.curve.harmonics if self.curve is not None else None,
             "states": records,
@@ -239,55 +241,64 @@ def section(
     from ballpass.runtime.ask.forcing_period import own_phases, refuse_changing, refuse_free_driver
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
+    from ballpass.runtime.ask.strobe import strobe_of
     from ballpass.runtime.run.ball_angles import ball_angles
     from ballpass.runtime.time.timeline import cycle_turns
 
     manifest = model.manifest
-    turn, numbers = model.period(parameters or {}), model.numbers(parameters or {})
+    given = parameters or {}
+    turn, numbers = model.period(given), model.numbers(given)
     refuse_free_driver(manifest, numbers.values, "section")
-    if not math.isfinite(turn):
-        raise RequestError("section: nothing turns in this scene. Allowed: a driver or shaft that turns.")
+    strobe = strobe_of(model, given, None, "section")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
     angle, turns = 0.0 if at is None else at, cycle_turns(manifest, numbers.values)
     times = turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
-    refuse_changing(manifest, numbers.values, "section", turn * turns * settling, float(times[-1]))
+    begin, end = turn * turns * settling, float(times[-1])
+    refuse_changing(manifest, numbers.values, "section", begin, end)
+    every = np.union1d(times, strobe.sample_times(model, given, begin, end))
     with shown("taking points", progress):
         run = model.simulate(
-            duration=float(times[-1]),
-            times=times,
-            parameters=parameters,
+            duration=end,
+            times=every,
+            parameters=given,
             rtol=SECTION_RTOL if rtol is None else rtol,
             outputs=[],
             transient=0.0,
             progress=False,
         )
-    period = turns * period_of(run.x, np.array(run.statistics.magnitudes), FEW)
+    states = run.x[np.searchsorted(run.t, times)]
+    magnitude = np.array(run.statistics.magnitudes)
+    period = turns * period_of(states, magnitude, FEW)
     phase, around, curve = np.zeros(readings), bearing_words(PITCH, manifest.bearings), None
     others: tuple[str, ...] = ()
     if len(manifest.bearings) == 1:
         pick = np.linspace(0, readings - 1, MOMENTS).astype(int)
-        others = tuple(own_phases(model, numbers, run.t[pick], run.x[pick], turns * turn))
-        first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(run.t.tolist(), run.x, strict=True)]
+        others = tuple(own_phases(model, numbers, times[pick], states[pick], turns * turn))
+        first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(times.tolist(), states, strict=True)]
         rounds = np.array(first) / math.tau
         phase = rounds * manifest.bearings[0].balls
-        curve = None if period or others else fit_curve(phase, run.x)
+        curve = None if period or others else fit_curve(phase, states)
         if curve is not None and np.max(curve.missed) > ON_CURVE:
             # where a ball differs, all balls are in their places again after a turn of the cage
-            whole = fit_curve(rounds, run.x)
+            whole = fit_curve(rounds, states)
             if np.max(whole.missed) <= ON_CURVE:
                 phase, around, curve = rounds, CAGE, whole
+    follows = curve is not None and bool(np.max(curve.missed) <= ON_CURVE)
+    follows = follows or bool(period_of(states, magnitude))  # a longer period than that of few points
     return PoincareSection(
         names=names,
         units=tuple(info.unit for info in manifest.states),
         descriptions=tuple(info.description for info in manifest.states),
         row=names.index(state),
         angle=angle,
-        states=run.x,
+        states=states,
         turns=turns,
         phase=phase % 1.0,
         around=around,
         period=period,
         curve=curve,
         others=others,
+        motion=strobe.name_of(model, given, run, begin, follows=follows),
+        every=strobe.every,
     )
