@@ -257,7 +257,9 @@ def test_derivatives_of_a_run_up_agree_with_runs_beside_it(with_bearing: Model) 
     assert {pair.check.verdict.name for pair in report.pairs} == {"VERIFIED"}, str(report)
 
 
-def test_a_run_up_has_no_period(with_bearing: Model) -> None:
-    for ask in (with_bearing.steady, with_bearing.section):
-        with pytest.raises(RequestError, match="speed changes by its table"):
-            ask()
+def test_a_run_down_to_rest_has_no_period(with_bearing: Model) -> None:
+    still = {"mechanism.driver.table.speed.3": 0.0}
+    with pytest.raises(RequestError, match="nothing turns"):
+        with_bearing.section(parameters=still)
+    with pytest.raises(RequestError, match="do not change with time"):
+        with_bearing.steady(parameters=still)

@@ -139,3 +139,27 @@ def test_behind_the_last_row_it_is_the_machine_of_that_speed(press: Model, even:
     assert {mark.name for mark in lines.marks} == {"shaft", "FTF", "BPFO", "BPFI", "2 BSF"}
     with pytest.raises(RequestError, match="behind its last row"):
         press.settle(transient=1)
+
+
+@pytest.mark.long
+def test_a_run_up_comes_to_the_steady_state_of_its_last_speed(tmp_path: Path) -> None:
+    """From backwards to forwards, so that driver and balls stand at the last row where they stood at the start."""
+    cage = ('pitch_diameter = "33.5 mm"', 'pitch_diameter = "31.75 mm"')
+    assert PRESS.count(cage[0]) == 1
+    table = 'table = { time = ["0 s", "0.4 s"], speed = ["-500 rpm", "500 rpm"] }\n'
+    text = PRESS.replace(*cage)
+    known = load(generate(scene_from_text(text, "even"), tmp_path / "even"))
+    there = load(generate(scene_from_text(text.replace(SPEED, table), "there"), tmp_path / "there"))
+    one, other = known.steady(), there.steady()
+    assert (one.begin, other.begin) == (0.0, pytest.approx(0.4, abs=1e-12))
+    assert other.start == pytest.approx(one.start, rel=1e-6, abs=1e-12)
+    assert np.abs(other.multipliers) == pytest.approx(np.abs(one.multipliers), rel=1e-5, abs=1e-9)
+    assert other.contacts.same(one.contacts)
+    points = [model.section("inner.y", readings=60, settling=60) for model in (known, there)]
+    assert points[1].states[-1] == pytest.approx(points[0].states[-1], rel=1e-3)  # of runs at 1e-6
+    assert points[0].period == points[1].period
+    path = "bearing.clearance=9 um:10 um:2"
+    kinds = [[motion.kind for motion in model.bifurcation(path, readings=30).up] for model in (known, there)]
+    assert kinds[0] == kinds[1]
+    ends = [model.steady(over="bearing.clearance=10 um:9 um").branches[0].points[-1] for model in (known, there)]
+    assert ends[1].nodes[0] == pytest.approx(ends[0].nodes[0], rel=1e-6, abs=1e-12)

@@ -20,7 +20,6 @@ from ballpass.runtime.ask.kept_parts import Arrays
 from ballpass.runtime.ask.shooting import Shooting
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges
 from ballpass.runtime.quantity.track import ChannelValues, follow
@@ -29,7 +28,7 @@ from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.loop import segments_of, steps_of
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
-from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.run.start import state_at
 from ballpass.runtime.time.turning import TURN
 
 #: Parts of a step at whose ends contacts are evaluated.
@@ -131,7 +130,7 @@ def contact_sequence(shooting: Shooting, nodes: np.ndarray, value: float | None 
         t.append(times[first:])
         parts.append([table[first:] for table in found])
     tables = [np.concatenate(one) for one in zip(*parts, strict=True)]
-    shifts = [*_shifts(model, numbers, nodes[0], length), *(0 for _ in stops)]
+    shifts = [*_shifts(shooting, numbers, nodes[0], length), *(0 for _ in stops)]
     names = [[f"{one.name} {k + 1}".lstrip() for k in range(one.balls)] for one in bearings] + [
         [name] for name in stops
     ]
@@ -157,8 +156,7 @@ def _deflections(
 ) -> Arrays:
     """Times within and at the ends of the steps of a segment, and deflections there, a table for each channel."""
     model = shooting.model
-    states = tuple(info.name for info in model.manifest.states)
-    begin = RunEnd(time=part[0] * length / part[1], x=start.copy(), states=states, parameters=numbers.parameters)
+    begin = state_at(model, numbers, shooting.begin(numbers) + part[0] * length / part[1], start)
     kinks = kinks_with_derivatives(None, model.manifest)
     request = Request(
         duration=length / part[1],
@@ -179,9 +177,10 @@ def _deflections(
     return t, *(seen[name].value for name in channels.channels)
 
 
-def _shifts(model: LoadedModel, numbers: Numbers, state: np.ndarray, length: float) -> list[int]:
+def _shifts(shooting: Shooting, numbers: Numbers, state: np.ndarray, length: float) -> list[int]:
     """For each bearing: after a period ball k stands where ball k + shift stood."""
-    first, last = (ball_angles(model, numbers, time, state) for time in (0.0, length))
+    begin = shooting.begin(numbers)
+    first, last = (ball_angles(shooting.model, numbers, time, state) for time in (begin, begin + length))
     return [round(float(b[0] - a[0]) * len(a) / TURN) % len(a) for a, b in zip(first, last, strict=True)]
 
 

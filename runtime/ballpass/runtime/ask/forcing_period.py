@@ -79,13 +79,8 @@ def _rate(info: TurningInfo, values: Mapping[str, float]) -> float:
     return float(Turning.of(info, values).rate[-1])
 
 
-def refuse_free_driver(manifest: Manifest, values: Mapping[str, float], question: str) -> None:
-    """Refuse a scene where the driver's motion or a cage's lag is a state, or its speed changes: no period."""
-    if not timeline.one_speed(manifest, values):
-        raise RequestError(
-            f"{question}: the driver's speed changes by its table, and turns are counted at its first speed. Allowed: "
-            "a constant speed, or rows of equal speed: that of the last row, say (--set)."
-        )
+def refuse_free_driver(manifest: Manifest, question: str) -> None:
+    """Refuse a scene where the driver's motion or a cage's lag is a state: no period."""
     if timeline.is_free(manifest):
         raise RequestError(
             f"{question}: a torque drives in this scene, and the driver's motion is a state. Allowed: a driver or "
@@ -98,23 +93,14 @@ def refuse_free_driver(manifest: Manifest, values: Mapping[str, float], question
         )
 
 
-def refuse_changing(manifest: Manifest, values: Mapping[str, float], question: str, begin: float, end: float) -> None:
-    """Refuse points between two times [s] of turns that a table over time makes unlike each other."""
-    if timeline.changes_over_time(manifest, values, begin, end):
-        raise RequestError(
-            f"{question}: a load, speed or slip follows a table or a window over time, with rows between {begin:.4g} s "
-            f"and {end:.4g} s, from where points are taken: turns there are unlike each other. Allowed: points behind "
-            "the last row (settling)."
-        )
-
-
 def sampled_turns(model: LoadedModel, parameters: Mapping[str, float], turns: float = 1.0) -> Solution:
-    """A run from the scene's start over so many turns, or a second where nothing turns, sampled at `MOMENTS`."""
+    """A run from the scene's start over so many turns that are alike, or a second where nothing turns, sampled at
+    `MOMENTS` of them."""
     numbers = model.numbers(parameters)
-    turn = timeline.period(model.manifest, numbers.values)
-    duration = turns * turn if math.isfinite(turn) else 1.0
-    times = np.linspace(0.0, duration, MOMENTS)
-    return simulate(model, numbers, Request(duration=duration, times=times, outputs=[], transient_cycles=0.0))
+    turn, begin = timeline.period(model.manifest, numbers.values), timeline.alike_from(model.manifest, numbers.values)
+    end = begin + (turns * turn if math.isfinite(turn) else 1.0)
+    times = np.linspace(begin, end, MOMENTS)
+    return simulate(model, numbers, Request(duration=end, times=times, outputs=[], transient_cycles=0.0))
 
 
 def forcing_period(
@@ -132,7 +118,6 @@ def forcing_period(
     RequestError
         What turns has no common period, or nothing changes with time.
     """
-    _refuse_tables(model, numbers, times)
     if turns is not None:
         driver = timeline.driver_info(model.manifest)
         if driver is None or _rate(driver, numbers.values) == 0.0:
@@ -213,11 +198,7 @@ def phase_drifts(
     times, states : as for `forcing_period`
     """
     found: dict[str, float] = {}
-    try:
-        rates = _rates(model, numbers, times, states)
-    except RequestError:  # what follows a table over time has no phase
-        return found
-    for info, alike in rates.items():
+    for info, alike in _rates(model, numbers, times, states).items():
         rounds = abs(_rate(info, numbers.values)) * float(alike) * every / TURN
         if abs(rounds - round(rounds)) > EXACT * rounds:
             found[info.rate] = rounds % 1.0
@@ -230,19 +211,9 @@ def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: 
     return [rate for rate in phase_drifts(model, numbers, times, states, every) if rate not in alike]
 
 
-def _refuse_tables(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> None:
-    first = float(np.min(times))
-    if timeline.settled_after(model.manifest, numbers.values) > first + timeline.TIME_RESOLUTION * abs(first):
-        raise RequestError(
-            "steady: a load, speed or slip follows a table over time that goes on behind the moments that are looked "
-            f"at ({first:.4g} s), which has no period. Allowed: moments behind its last row, rows of equal values."
-        )
-
-
 def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[TurningInfo, Fraction]:
     """What turns that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls:
     a part of one where loads repeat after several."""
-    _refuse_tables(model, numbers, times)
     found: dict[TurningInfo, Fraction] = {}
     for k, item in enumerate(model.manifest.inputs):
         if not item.turning or item.kind in ("angle", "rate", "slope"):

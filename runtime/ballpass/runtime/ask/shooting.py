@@ -25,7 +25,7 @@ from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import sensitivities
-from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.run.start import state_at
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 
@@ -119,6 +119,10 @@ class Shooting:
         given = dict(self.parameters) if value is None else {**self.parameters, self.over: value}
         return self.model.numbers(given)
 
+    def begin(self, numbers: Numbers) -> float:
+        """Time of the first state [s]: turns are alike from then on."""
+        return timeline.alike_from(self.model.manifest, numbers.values)
+
     def residual(self, nodes: np.ndarray, value: float | None = None, rtol: float | None = None) -> Residual:
         """What a period leaves from these states at the segments' starts, shape (segments, states).
 
@@ -144,10 +148,11 @@ class Shooting:
         numbers = self.numbers(value)
         length = self.repeats * self.period.time(numbers.values)
         names = [*model.manifest.initial, *([self.over] if self.over else [])]
-        later = 0.0
+        first = later = 0.0
         if self.over:  # where the period is a function of the parameter, so are the ends of all segments
-            chain = Chain(model, numbers, [self.over])
-            later = self.repeats * self.period.slope(numbers.values, chain.moved_numbers[0])
+            (moved,) = Chain(model, numbers, [self.over]).moved_numbers
+            later = self.repeats * self.period.slope(numbers.values, moved)
+            first = timeline.alike_from_slope(model.manifest, numbers.values, moved)
         left = np.empty_like(nodes)
         by_parameter = np.zeros_like(nodes)
         by_states = np.zeros((self.segments, count, self.segments, count))
@@ -161,22 +166,21 @@ class Shooting:
             by_states[k, :, k] += flow * self.magnitude / self.magnitude[:, None]
             by_states[k, :, nxt] -= np.eye(count)
             if self.over:
-                ends = [(k + j) * length / self.segments for j in (0, 1)]
+                ends = [self.begin(numbers) + (k + j) * length / self.segments for j in (0, 1)]
                 rates = [
                     _rate(model, numbers, t, x, inside)
                     for t, x, inside in zip(ends, (nodes[k], end), (1.0, -1.0), strict=True)
                 ]
-                shift = [(k + j) / self.segments * later for j in (0, 1)]
-                moved = slopes[:, count] + rates[1] * shift[1] - flow @ rates[0] * shift[0]
-                by_parameter[k] = moved / self.magnitude
+                shift = [first + (k + j) / self.segments * later for j in (0, 1)]
+                by_value = slopes[:, count] + rates[1] * shift[1] - flow @ rates[0] * shift[0]
+                by_parameter[k] = by_value / self.magnitude
             monodromy = flow @ monodromy
         return left.ravel(), by_states.reshape(nodes.size, nodes.size), by_parameter.ravel(), monodromy
 
     def _request(self, nodes: np.ndarray, k: int, numbers: Numbers, rtol: float | None) -> Request:
         """A run over a segment."""
         length = self.repeats * self.period.time(numbers.values) / self.segments
-        states = tuple(info.name for info in self.model.manifest.states)
-        begin = RunEnd(time=k * length, x=nodes[k].copy(), states=states, parameters=numbers.parameters)
+        begin = state_at(self.model, numbers, self.begin(numbers) + k * length, nodes[k])
         return Request(
             duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol, progress=self.progress
         )

@@ -136,7 +136,9 @@ class Strobe:
     def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
         """Times between two others at which states are read, the last `READ` of them [s]."""
         step = self.time(model, parameters)
-        return step * np.arange(math.ceil(begin / step), math.floor(end / step) + 1)[-READ:]
+        alike = timeline.alike_from(model.manifest, model.numbers(parameters).values)
+        first, last = math.ceil((begin - alike) / step), math.floor((end - alike) / step)
+        return alike + step * np.arange(first, last + 1)[-READ:]
 
 
 def strobe_of(

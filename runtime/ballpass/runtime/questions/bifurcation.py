@@ -228,7 +228,7 @@ def bifurcation(
     >>> [motion.exponent.high < 0.0 for motion in found.up]
     [True, True]
     """
-    from ballpass.runtime.ask.forcing_period import refuse_changing, refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import refuse_free_driver
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.lyapunov import kind_of_motion, largest_exponent
     from ballpass.runtime.ask.parameter_range import parameter_range
@@ -243,8 +243,7 @@ def bifurcation(
     state = of or ("inner.y" if "inner.y" in names else names[0])
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
-    for end in (chosen.low, chosen.high):
-        refuse_free_driver(manifest, model.numbers({**overrides, chosen.name: end}).values, "bifurcation")
+    refuse_free_driver(manifest, "bifurcation")
     strobe = strobe_of(model, overrides, chosen, "bifurcation")
     stopped, done = Event(), [0]
 
@@ -269,9 +268,6 @@ def bifurcation(
             found, start = [], None
             for value in order.tolist():
                 given = {**overrides, chosen.name: value}
-                step = strobe.time(model, given)
-                values = model.numbers(given).values
-                refuse_changing(manifest, values, "bifurcation", settling * step, (settling + readings) * step)
                 states, flows, magnitude = motion(given, start, settling)
                 drifts = strobe.drifts(model, given)
                 grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
@@ -331,13 +327,17 @@ def _motion(
 ) -> Arrays:
     """The motion from a state on: readings, their derivatives by those before, if any, and magnitudes."""
     from ballpass.runtime.ask.lyapunov import strobe_with_tangents
+    from ballpass.runtime.run.start import state_at
+    from ballpass.runtime.time.timeline import alike_from
 
     count = max(settling, 1) if exponent else settling + readings
+    numbers = model.numbers(parameters)
+    begin = alike_from(model.manifest, numbers.values)
     run = model.simulate(
-        duration=count * step,
-        times=step * np.arange(1, count + 1),
+        duration=count * step if start is not None else begin + count * step,
+        times=begin + step * np.arange(1, count + 1),
         parameters=parameters,
-        initial=start,
+        initial=None if start is None else state_at(model, numbers, begin, start),
         rtol=SECTION_RTOL if rtol is None else rtol,
         outputs=[],
         transient=0.0,
@@ -348,6 +348,6 @@ def _motion(
         return run.x[settling:], np.zeros(0), magnitude
     tight = EXPONENT_RTOL if rtol is None else rtol
     return (
-        *strobe_with_tangents(model, model.numbers(parameters), run.end, step, readings, magnitude, tight, each),
+        *strobe_with_tangents(model, numbers, run.end, step, readings, magnitude, tight, each),
         magnitude,
     )

@@ -238,24 +238,24 @@ def section(
     >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
     True
     """
-    from ballpass.runtime.ask.forcing_period import own_phases, refuse_changing, refuse_free_driver
+    from ballpass.runtime.ask.forcing_period import own_phases, refuse_free_driver
     from ballpass.runtime.ask.invariant_curve import fit_curve
     from ballpass.runtime.ask.lyapunov import period_of
     from ballpass.runtime.ask.strobe import strobe_of
     from ballpass.runtime.run.ball_angles import ball_angles
-    from ballpass.runtime.time.timeline import cycle_turns
+    from ballpass.runtime.time.timeline import alike_from, cycle_turns
 
     manifest = model.manifest
     given = parameters or {}
     turn, numbers = model.period(given), model.numbers(given)
-    refuse_free_driver(manifest, numbers.values, "section")
+    refuse_free_driver(manifest, "section")
     strobe = strobe_of(model, given, None, "section")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
     angle, turns = 0.0 if at is None else at, cycle_turns(manifest, numbers.values)
-    times = turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
-    begin, end = turn * turns * settling, float(times[-1])
-    refuse_changing(manifest, numbers.values, "section", begin, end)
+    alike = alike_from(manifest, numbers.values)
+    times = alike + turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
+    begin, end = alike + turn * turns * settling, float(times[-1])
     every = np.union1d(times, strobe.sample_times(model, given, begin, end))
     with shown("taking points", progress):
         run = model.simulate(

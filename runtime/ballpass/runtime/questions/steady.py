@@ -93,7 +93,8 @@ class SteadyState(ShortRepr, Reported):
     forcing : what happens in a period of the equations
     repeats : periods of the equations in it
     sooner : after so many of them it is there again; `repeats` where there is no such
-    start : state at t = 0, shape (states,)
+    start : state that repeats, shape (states,)
+    begin : its time, t = 0 or, where rows of a table change a value, behind the last one at the angle of the start [s]
     multipliers : eigenvalues of the derivative of the state after a period by that at the start, largest first
     resolution : size below which a multiplier is not known from zero
     contacts : which elements touch, in which order, within a period
@@ -122,6 +123,7 @@ class SteadyState(ShortRepr, Reported):
     repeats: int
     sooner: int
     start: np.ndarray
+    begin: float
     multipliers: np.ndarray
     resolution: float
     contacts: ContactSequence
@@ -187,8 +189,9 @@ class SteadyState(ShortRepr, Reported):
             for name, unit, start in zip(self.states, self.units, self.start.tolist(), strict=True)
         ]
         turns = "" if math.isnan(self.turns) else f", {self.turns:.10g} turns"
+        begin = f"{self.begin:.10g} s" if self.begin else "0"
         table = ReportTable(
-            title=f"State at t = 0 that repeats after {self.period:.10g} s{turns}",
+            title=f"State at t = {begin} that repeats after {self.period:.10g} s{turns}",
             heads=("state", "start", "unit", "what"),
             rows=[
                 (name, f"{factor * start:z.10g}", shown_unit, short_words(description))
@@ -298,13 +301,14 @@ def steady(
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
+    from ballpass.runtime.time.timeline import alike_from
 
     manifest = model.manifest
     _ = model.stepper  # refused here where a scene has none
     ends = None if over is None else parameter_range(manifest.parameters, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)
-    refuse_free_driver(manifest, numbers.values, "steady")
+    refuse_free_driver(manifest, "steady")
     turn = model.period(given)
     with kept_parts(keep, model, given, ends, turns, transient) as parts, shown("shooting", progress) as tell:
         sample = partial(sampled_turns, model, turns=max(transient, 1.0))
@@ -348,6 +352,7 @@ def steady(
         repeats=repeats,
         sooner=sooner,
         start=found.nodes[0],
+        begin=alike_from(manifest, numbers.values),
         multipliers=found.multipliers,
         resolution=SENSITIVITY * sampled.statistics.rtol,
         contacts=contacts,
@@ -364,12 +369,18 @@ def steady(
 def _run(
     model: AnyModel, parameters: Mapping[str, float], duration: float, parts: int, initial: np.ndarray | None = None
 ) -> Solution:
-    """A run without outputs, from the scene's start if no other is given, sampled at the ends of equal parts."""
+    """A run without outputs over turns that are alike, from the scene's start if no state there is given, sampled at
+    the ends of equal parts."""
+    from ballpass.runtime.run.start import state_at
+    from ballpass.runtime.time.timeline import alike_from
+
+    numbers = model.numbers(parameters)
+    begin = alike_from(model.manifest, numbers.values)
     found: Solution = model.simulate(
-        duration=duration,
+        duration=duration if initial is not None else begin + duration,
         parameters=parameters,
-        initial=initial,
-        times=np.linspace(0.0, duration, parts + 1),
+        initial=None if initial is None else state_at(model, numbers, begin, initial),
+        times=begin + np.linspace(0.0, duration, parts + 1),
         outputs=[],
         transient=0.0,
         progress=False,

@@ -49,6 +49,12 @@ class RunEnd(ShortRepr):
     parameters: Mapping[str, float] = field(repr=False)
 
 
+def state_at(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarray) -> RunEnd:
+    """A start in a state at a time [s]."""
+    states = tuple(info.name for info in model.manifest.states)
+    return RunEnd(time=time, x=np.array(x), states=states, parameters=numbers.parameters)
+
+
 #: Type of a given start; None is the scene's.
 Start = np.ndarray | RunEnd | None
 

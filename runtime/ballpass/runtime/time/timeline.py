@@ -358,6 +358,25 @@ def settled_after(manifest: Manifest, values: Values) -> float:
     return max((last for _, last in _changes(manifest, values)), default=-math.inf)
 
 
+def alike_from(manifest: Manifest, values: Values) -> float:
+    """Time from which on turns are alike, driver or shaft at its first angle [s]; 0 where no row changes a value."""
+    settled = settled_after(manifest, values)
+    if not settled > 0.0:
+        return 0.0
+    turning = driver(manifest, values)
+    found = turning.first_pass(float(turning.at(0.0)[0]), cycle_turns(manifest, values), settled)
+    return settled if found is None else found
+
+
+def alike_from_slope(manifest: Manifest, values: Values, moved: Mapping[str, float]) -> float:
+    """Its derivative along a direction of the values [s/unit]."""
+    info, begin = driver_info(manifest), alike_from(manifest, values)
+    if info is None or begin == 0.0:
+        return 0.0
+    start = moved.get(info.offset, 0.0) if info.offset else 0.0
+    return (start - angle_slope(info, values, moved, begin)) / float(Turning.of(info, values).at(begin)[1])
+
+
 def _changes(manifest: Manifest, values: Values) -> Iterator[tuple[float, float]]:
     """Spans of time in which tables over time change a value; one that jumps does so at once [s]."""
     valued = {item.times for item in manifest.inputs if item.kind == "table"}
