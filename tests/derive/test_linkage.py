@@ -46,9 +46,7 @@ def derived(name: str) -> tuple[Machine, Linkage]:
 
 
 def joint_points(machine: Machine, linkage: Linkage, joint: Joint) -> list:
-    return [
-        linkage.motion(machine.mechanism, body, point) for body, point in zip(joint.bodies, joint.points, strict=True)
-    ]
+    return [linkage.motion(body, point) for body, point in zip(joint.bodies, joint.points, strict=True)]
 
 
 @every_machine
@@ -116,7 +114,7 @@ def test_points_for_drawing_are_those_of_frame_and_bodies_with_centres_of_mass()
 def test_crank_slider_equals_the_textbook_stroke():
     """Slider below A on its line: y = l1 sin(theta) − sqrt(l2² − l1² cos²(theta))."""
     machine, linkage = derived("crank-slider")
-    x, y = evaluate(machine, linkage.motion(machine.mechanism, "slider", "C").position, TURN, linkage)
+    x, y = evaluate(machine, linkage.motion("slider", "C").position, TURN, linkage)
     expected = 6e-3 * np.sin(TURN) - np.sqrt(0.1**2 - (6e-3 * np.cos(TURN)) ** 2)
     assert np.max(np.abs(y - expected)) < 1e-16
     assert np.max(np.abs(x)) < 1e-16
@@ -131,7 +129,7 @@ def test_four_bar_equals_the_law_of_cosines(branch, sign):
     line = (0.2 + 0.03j) - pin
     opening = np.arccos((np.abs(line) ** 2 + 0.19**2 - 0.13**2) / (2 * np.abs(line) * 0.19))
     expected = pin + 0.19 * np.exp(1j * (np.angle(line) + sign * opening))
-    x, y = evaluate(machine, linkage.motion(machine.mechanism, "coupler", "C").position, TURN, linkage)
+    x, y = evaluate(machine, linkage.motion("coupler", "C").position, TURN, linkage)
     assert np.max(np.abs(x + 1j * y - expected)) < 1e-15
 
 
@@ -142,9 +140,9 @@ def test_branch_of_rrr_is_the_side_of_the_line_between_the_outer_joints():
             machine = four_bar().with_joint("C", bodies=bodies, branch=branch)
             linkage = machine.linkage()
             outer = {"coupler": "B", "rocker": "D"}
-            start = linkage.motion(machine.mechanism, bodies[0], outer[bodies[0]]).position
-            end = linkage.motion(machine.mechanism, bodies[1], outer[bodies[1]]).position
-            inner = linkage.motion(machine.mechanism, "coupler", "C").position
+            start = linkage.motion(bodies[0], outer[bodies[0]]).position
+            end = linkage.motion(bodies[1], outer[bodies[1]]).position
+            inner = linkage.motion("coupler", "C").position
             x0, y0, x1, y1, x, y = evaluate(machine, [*start, *end, *inner], TURN, linkage)
             assert np.all(side * ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) > 0)
 
@@ -159,8 +157,8 @@ def test_branch_of_rrp_is_ahead_or_behind_along_the_guide(make):
         guide = next(j for j in machine.mechanism.joints if j.kind == "prismatic")
         angle = sp.Symbol(guide.direction.path, real=True)
         along = linkage.pose(guide.bodies[0]).rotate((sp.cos(angle), sp.sin(angle)))
-        start = linkage.motion(machine.mechanism, body, outer).position
-        end = linkage.motion(machine.mechanism, body, inner).position
+        start = linkage.motion(body, outer).position
+        end = linkage.motion(body, inner).position
         reach = dot(along, tuple(b - a for a, b in zip(start, end, strict=True)))
         (values,) = evaluate(machine, [reach], TURN, linkage)
         assert np.all(side * values > 0)
@@ -207,8 +205,8 @@ def test_radicand_of_the_slider_crank_keeps_its_digits_where_the_rod_is_across_t
 
 def test_margin_is_the_squared_sine_of_the_transmission_angle():
     machine, linkage = derived("four-bar")
-    inner, outer = (linkage.motion(machine.mechanism, "coupler", p).position for p in ("C", "B"))
-    far = linkage.motion(machine.mechanism, "rocker", "D").position
+    inner, outer = (linkage.motion("coupler", p).position for p in ("C", "B"))
+    far = linkage.motion("rocker", "D").position
     margin, *rest = evaluate(machine, [linkage.margins[0].expression, *inner, *outer, *far], TURN, linkage)
     xc, yc, xb, yb, xd, yd = (np.broadcast_to(v, TURN.shape) for v in rest)
     sine = np.sin(np.angle(((xb - xc) + 1j * (yb - yc)) / ((xd - xc) + 1j * (yd - yc))))

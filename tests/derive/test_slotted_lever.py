@@ -24,9 +24,7 @@ def test_branch_is_ahead_or_behind_along_the_guide(guide_on_block: bool) -> None
         linkage = machine.linkage()
         direction = sp.Symbol("mechanism.joints.S.direction", real=True)
         tx, ty = linkage.poses["lever"].rotate((sp.cos(direction), sp.sin(direction)))
-        (x0, y0), (x1, y1) = (
-            linkage.motion(machine.mechanism, b, p).position for b, p in (("lever", "O"), ("block", "B"))
-        )
+        (x0, y0), (x1, y1) = (linkage.motion(b, p).position for b, p in (("lever", "O"), ("block", "B")))
         order = -1 if guide_on_block else 1  # from the hinge of the guide's body to the other one
         (along,) = evaluate(machine, [order * ((x1 - x0) * tx + (y1 - y0) * ty)], np.linspace(0, 6, 61), linkage)
         assert np.all(side * along > 0)

@@ -29,6 +29,8 @@ DRIVE = KnownDrive(
     angle=ANGLE,
     speed=SPEED,
     acceleration=sp.S.Zero,
+    first_angle=sp.Symbol("mechanism.driver.start_angle", real=True),
+    first_speed=SPEED,
     description="the driver's speed is constant",
     turning=TurningInfo(
         name="driver",
@@ -86,10 +88,10 @@ class Machine:
         return derive_linkage(self.mechanism, DRIVE)
 
     def forces(self, linkage: Linkage) -> Forces:
-        return derive_forces(self.mechanism, linkage, DRIVE)
+        return derive_forces(linkage)
 
     def reactions(self, linkage: Linkage, moments: Sequence[str] = ()) -> Reactions:
-        return derive_reactions(self.mechanism, linkage, self.forces(linkage).loads, frozenset(moments))
+        return derive_reactions(linkage, self.forces(linkage).loads, frozenset(moments))
 
     def with_windows(self, name: str) -> Machine:
         """The force `name` acts within a window; its gate is the symbol ``gate.<name>``."""

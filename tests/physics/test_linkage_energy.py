@@ -32,7 +32,7 @@ def press() -> tuple[Machine, Linkage, Reactions, Evaluator]:
     machine = crank_slider().with_windows("punch")
     linkage = machine.linkage()
     reactions = machine.reactions(linkage)
-    height = linkage.motion(machine.mechanism, "slider", "C").position[1]
+    height = linkage.motion("slider", "C").position[1]
     run = Evaluator(linkage.definitions + reactions.definitions, [reactions.drive_torque, height])
     return machine, linkage, reactions, run
 

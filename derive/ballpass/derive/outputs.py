@@ -11,11 +11,9 @@ from fnmatch import fnmatchcase
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.drive import KnownDrive
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output
 
@@ -66,10 +64,10 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     return out
 
 
-def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions) -> list[Output]:
+def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
     """Outputs of a mechanism, in the order of listing: reactions, drive, angles of the bodies."""
     out: list[Output] = []
-    for joint in mechanism.joints:
+    for joint in linkage.mechanism.joints:
         first, second = joint.bodies
         for axis, force in zip("xy", reactions.joint_force[joint.name], strict=True):
             out.append(
@@ -93,32 +91,19 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
     torque = reactions.drive_torque if drive.torque is None else drive.torque
     words = "Torque of the drive on the driven body, counter-clockwise"
     out.append(Output(name="drive_torque", expression=torque, unit="N*m", description=words))
-    angle = drive.coordinate
-    if isinstance(drive, KnownDrive) and drive.whole is not None:
-        out.append(
-            Output(name="drive_power", expression=torque * drive.speed, unit="W", description="Power of the drive")
-        )
-        out += [
-            Output(name=f"driver.{key}", expression=expression, unit=unit, description=f"{words} of the driven body")
-            for key, expression, unit, words in (
-                ("angle", drive.whole, "rad", "Angle, whole turns counted,"),
-                ("speed", drive.speed, "rad/s", "Speed"),
-                ("acceleration", drive.acceleration, "rad/s^2", "Angular acceleration"),
-            )
-        ]
-    if angle is None:
-        words = "Angle of the driven body, within the turn"
-        within = _within_turn(DRIVER_ANGLE, sp.S.Zero)
-        out.append(Output(name="drive_angle", expression=within, unit="rad", description=words))
-    else:
+    if drive.whole is not None:
         rows = (
-            ("drive_power", torque * angle.velocity, "W", "Power of the drive"),
-            (angle.name, angle.position, "rad", "Angle of the driven body from +x, whole turns counted"),
-            (angle.velocity.name, angle.velocity, "rad/s", "Speed of the driven body"),
+            ("drive_power", torque * drive.speed, "W", "Power of the drive"),
+            ("driver.angle", drive.whole, "rad", "Angle of the driven body from +x, whole turns counted"),
+            ("driver.speed", drive.speed, "rad/s", "Speed of the driven body"),
             ("driver.acceleration", drive.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
         )
         out += [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
-    for body in mechanism.bodies:
+    if drive.coordinate is None:
+        words = "Angle of the driven body, within the turn"
+        within = _within_turn(DRIVER_ANGLE, sp.S.Zero)
+        out.append(Output(name="drive_angle", expression=within, unit="rad", description=words))
+    for body in linkage.mechanism.bodies:
         pose = linkage.poses[body.name]
         out.append(
             Output(

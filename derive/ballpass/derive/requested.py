@@ -15,7 +15,6 @@ import sympy as sp
 
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.drive import KnownDrive
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
@@ -24,7 +23,6 @@ from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.outputs import named_rings
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
@@ -42,12 +40,12 @@ def power_of(efforts: Iterable[Effort]) -> sp.Expr:
     return sp.Add(*(effort.amount * effort.rate for effort in efforts))
 
 
-def motion_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions) -> list[Output]:
+def motion_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
     """Motion of every point and body, and magnitudes of the reactions."""
     out: list[Words] = []
-    for body in mechanism.bodies:
+    for body in linkage.mechanism.bodies:
         pose = linkage.poses[body.name]
-        points = {p.name: linkage.motion(mechanism, body.name, p.name) for p in body.points}
+        points = {p.name: linkage.motion(body.name, p.name) for p in body.points}
         for point, motion in (points | {CENTER_OF_MASS: pose.center_of_mass}).items():
             rows = (("", motion.position, "m"), ("v", motion.velocity, "m/s"), ("a", motion.acceleration, "m/s^2"))
             words = f"of {point} of the {body.name}"
@@ -58,7 +56,7 @@ def motion_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions)
         turning = f"of the {body.name}, counter-clockwise"
         out.append((f"body.{body.name}.speed", pose.rate, "rad/s", f"Angular velocity {turning}"))
         out.append((f"body.{body.name}.acceleration", pose.acceleration, "rad/s^2", f"Angular acceleration {turning}"))
-    for joint in mechanism.joints:
+    for joint in linkage.mechanism.joints:
         force = reactions.joint_force[joint.name]
         words = f"Magnitude of the force of the {joint.bodies[1]} on the {joint.bodies[0]} at {joint.name}"
         out.append((f"reaction.{joint.name}.magnitude", sp.sqrt(dot(force, force)), "N", words))
@@ -89,7 +87,7 @@ def power_outputs(
         out.append(("weight.power", power_of(weights), "W", "Power of all weights"))
         height = sp.Add(*(-weight.amount * weight.place for weight in weights))
         out.append(("weight.energy", height, "J", "Potential energy of all weights, 0 at the frame's origin"))
-    if isinstance(linkage.drive, KnownDrive) and linkage.drive.even:  # else it is listed
+    if linkage.drive.even:  # else it is listed
         power = reactions.drive_torque * linkage.drive.speed
         out.append(("drive_power", power, "W", "Power of the drive"))
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2
@@ -207,9 +205,7 @@ def _count(bearing: Bearing) -> sp.Expr:
     return sp.S.One if bearing.count is None else symbol_of(bearing.count)
 
 
-def bearing_power_outputs(
-    bearing: Bearing, model: BearingModel, load: Pair | None, turning: sp.Expr = sp.S.Zero
-) -> list[Output]:
+def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | None, turning: sp.Expr) -> list[Output]:
     """Power of the balls and of the housing's spring and damper on the rings, and power loss of the dampers.
 
     Parameters
@@ -227,7 +223,8 @@ def bearing_power_outputs(
         stiffness, damping = symbol_of(bearing.outer.stiffness), symbol_of(bearing.outer.damping)
         out, moving = (c[2].position, c[3].position), (c[2].velocity, c[3].velocity)
         apart, parting = subtract(place, out), subtract(speed, moving)
-        seen = subtract(moving, scale(turning, quarter_turn(out)))  # the damper turns with the housing
+        # in a linkage with play the damper turns with the housing
+        seen = subtract(moving, scale(turning, quarter_turn(out))) if load is None else moving
         loss = count * damping * dot(seen, seen)
         spring = -count * stiffness * dot(out, moving)
         rows = [

@@ -9,13 +9,13 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage import Cage, cage_between, cage_on_shaft
+from ballpass.derive.bearing.cage import Cage, cage_of
 from ballpass.derive.bearing.equations import (
     BearingModel,
     RingMotion,
@@ -25,17 +25,17 @@ from ballpass.derive.bearing.equations import (
     ring_motion,
 )
 from ballpass.derive.bearing.equivalent_mass import inner_mass
-from ballpass.derive.bearing.ring_load import own_loads, reaction_share
-from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, KnownDrive, drive_of, shaft_drive
+from ballpass.derive.bearing.ring_load import RingLoad, load_on, own_loads
+from ballpass.derive.bearing.two_way import Coupled, carriers_of, couple, play_of
+from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
-from ballpass.derive.mechanism.forces import Forces, derive_forces
-from ballpass.derive.mechanism.kinematics import Play
-from ballpass.derive.mechanism.linear_forms import Effort, Inertia, LinearForms
-from ballpass.derive.mechanism.linkage import NO_PLAY, Linkage, check_assembly, derive_linkage
-from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, work_of, work_of_drive
+from ballpass.derive.mechanism.forces import NO_FORCES, Forces, derive_forces
+from ballpass.derive.mechanism.kinematics import Motion, Pair
+from ballpass.derive.mechanism.linear_forms import Effort, EquationsOfMotion, Inertia, LinearForms
+from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
+from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, weights_of, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
+from ballpass.derive.mechanism.swing import STILL, Swing, swing_of, with_driver
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.requested import (
     balance_outputs,
@@ -45,9 +45,8 @@ from ballpass.derive.requested import (
     power_outputs,
     ring_outputs,
 )
-from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import LinkageError, SceneError
-from ballpass.derive.scene.records import FRAME, Mechanism, Scene
+from ballpass.derive.scene.records import Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
 from ballpass.runtime.contract.arguments import typed
@@ -158,12 +157,8 @@ def derive(scene: Scene) -> System:
     (2, 1)
     """
     errors: list[SceneError] = []
-    mechanism = scene.mechanism
-    if mechanism is None:
-        system: System | None = _on_shaft(scene, errors)
-    else:
-        moving = scene.coupled or mechanism.driver.torque is not None
-        system = (_moving if moving else _one_way)(scene, mechanism, errors)
+    parts = _parts(scene, errors)
+    system = None if parts is None else _system(parts, errors)
     if errors:
         kind = LinkageError if all(isinstance(error, LinkageError) for error in errors) else SceneError
         raise kind(scene.lines.place(fault for error in errors for fault in error.faults))
@@ -180,300 +175,209 @@ def _noted(errors: list[SceneError]) -> Iterator[None]:
         errors.append(error)
 
 
-def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
-    """Bearings on a shaft, under the scene's own load."""
-    own = own_loads(scene)
-    drive = None if scene.shaft is None else shaft_drive(scene.shaft)
-    outer = scene.shaft is not None and scene.shaft.ring == "outer"
-    rings = []
-    for bearing in scene.bearings:
-        share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
-        load = (share * own.force[0], share * own.force[1])
-        rings.append(_rings(bearing, cage_on_shaft(bearing, drive, outer=outer), load, inner_mass(bearing, None)))
-    return _of_rings(scene, rings, errors, inputs=own.inputs, definitions=own.definitions, constants=own.constants)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Parts:
+    """The parts of a system, which do not know each other.
+
+    Attributes
+    ----------
+    linkage, forces, reactions : of a mechanism; None on a shaft
+    rings : of each bearing: how inner and outer ring turn
+    cages, models, loads : of each bearing; the load is that on an inner ring loaded one-way, else None
+    own : what these loads need
+    motions : of rings loaded one-way, which moves nothing else
+    coupled : what bearings coupled two-way add to the linkage
+    """
+
+    scene: Scene
+    drive: Drive
+    linkage: Linkage | None
+    forces: Forces
+    reactions: Reactions | None
+    rings: tuple[tuple[Swing, Swing], ...]
+    cages: tuple[Cage, ...]
+    models: tuple[BearingModel, ...]
+    own: RingLoad
+    loads: tuple[Pair | None, ...]
+    motions: tuple[RingMotion, ...]
+    coupled: tuple[Coupled, ...]
+
+    @property
+    def swings(self) -> tuple[Swing, ...]:
+        """How the bodies turn that carry rings."""
+        return tuple(dict.fromkeys(swing for pair in self.rings for swing in pair))
+
+    @property
+    def followers(self) -> tuple[tuple[Coordinate, sp.Expr], ...]:
+        """Coordinates on which nothing depends, with their accelerations."""
+        passive = () if self.drive.passive is None else ((self.drive.passive, self.drive.acceleration),)
+        return (*passive, *(cage.lag for cage in self.cages if cage.lag is not None))
+
+    @property
+    def definitions(self) -> tuple[Definition, ...]:
+        """Ordered, without those that reactions, loads on rings and equations of motion add."""
+        return (
+            *self.drive.definitions,
+            *(() if self.linkage is None else self.linkage.definitions),
+            *self.forces.definitions,
+            *(d for swing in self.swings for d in swing.definitions),
+            *(d for cage in self.cages for d in cage.definitions),
+        )
+
+    @property
+    def inertias(self) -> tuple[Inertia, ...]:
+        """Of all bodies, and of rings that move on their own in a linkage."""
+        of_linkage = () if self.linkage is None else inertia_of(self.linkage)
+        return (*of_linkage, *(inertia for part in self.coupled for inertia in part.inertias))
+
+    @property
+    def weights(self) -> tuple[Effort, ...]:
+        """Work of the weight of these."""
+        of_linkage = () if self.linkage is None else weights_of(self.linkage)
+        return (*of_linkage, *(weight for part in self.coupled for weight in part.weights))
+
+
+def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
+    """The parts of a scene, each derived after those that it needs; None, with the faults noted."""
+    mechanism, bearings, drive = scene.mechanism, scene.bearings, drive_of(scene)
+    masses: dict[str, sp.Expr] = {}
+    for bearing in bearings:
+        if bearing.coupling == "one-way":
+            with _noted(errors):
+                masses[bearing.name] = inner_mass(bearing, mechanism)
+    linkage, forces, reactions = None, NO_FORCES, None
+    if mechanism is None:
+        turning = with_driver(drive)
+        on_shaft = (STILL, turning) if scene.shaft is not None and scene.shaft.ring == "outer" else (turning, STILL)
+        rings = [on_shaft] * len(bearings)
+    else:
+        linked = _linked(scene, mechanism, drive, errors)
+        if linked is None:
+            return None
+        linkage, forces = linked
+        carriers = [carriers_of(bearing, linkage) for bearing in bearings]
+        swings = {body: swing_of(linkage, body) for pair in carriers for body in pair}
+        rings = [(swings[inner], swings[outer]) for inner, outer in carriers]
+    cages = [cage_of(bearing, pair, drive) for bearing, pair in zip(bearings, rings, strict=True)]
+    models = [derive_bearing(bearing, cage) for bearing, cage in zip(bearings, cages, strict=True)]
+    coupled: list[Coupled] = []
+    if linkage is not None:
+        coupled = [
+            couple(bearing, model, linkage)
+            for bearing, model in zip(bearings, models, strict=True)
+            if bearing.coupling == "two-way"
+        ]
+        applied = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
+        with _noted(errors):
+            reactions = derive_reactions(linkage, applied, _moments(scene))
+    massless = any(bearing.coupling == "one-way" and bearing.name not in masses for bearing in bearings)
+    if massless or (linkage is not None and reactions is None):
+        return None
+    own = own_loads(scene, drive)
+    loads = [load_on(bearing, own, linkage, reactions) for bearing in bearings]
+    return _Parts(
+        scene=scene,
+        drive=drive,
+        linkage=linkage,
+        forces=forces,
+        reactions=reactions,
+        rings=tuple(rings),
+        cages=tuple(cages),
+        models=tuple(models),
+        own=own,
+        loads=tuple(loads),
+        motions=tuple(
+            ring_motion(bearing, model, load, masses[bearing.name])
+            for bearing, model, load in zip(bearings, models, loads, strict=True)
+            if load is not None
+        ),
+        coupled=tuple(coupled),
+    )
 
 
 def _linked(
-    scene: Scene, mechanism: Mechanism, drive: Drive, play: Play, errors: list[SceneError]
+    scene: Scene, mechanism: Mechanism, drive: Drive, errors: list[SceneError]
 ) -> tuple[Linkage, Forces] | None:
     """The linkage and its loads; None, with the faults noted."""
     linkage, forces = None, None
+    play: dict[str, Motion] = {}
+    reach: dict[str, float] = {}
+    for bearing in scene.bearings:
+        if bearing.coupling == "two-way":
+            joint = mechanism.joint(bearing.joint or "")
+            play[joint.name] = play_of(bearing, joint, ring_coordinates(bearing))
+            # of several side by side the least play is all that the joint has
+            reach[joint.name] = min(max(bearing.clearance.value, 0.0) / 2.0, reach.get(joint.name, math.inf))
     with _noted(errors):
         linkage = derive_linkage(mechanism, drive, play)
         with _noted(errors):
-            forces = derive_forces(mechanism, linkage, drive)
+            forces = derive_forces(linkage)
         with _noted(errors):
-            reach: dict[str, float] = {}
-            for b in scene.bearings:
-                if b.joint is not None:
-                    # of several side by side the least play is all that the joint has
-                    reach[b.joint] = min(max(b.clearance.value, 0.0) / 2.0, reach.get(b.joint, math.inf))
             check_assembly(linkage, {q.path: q.value for q in scene.quantities}, reach)
         if forces is None:
-            derive_reactions(mechanism, linkage, (), _moments(scene, mechanism))  # for its faults
+            derive_reactions(linkage, (), _moments(scene))  # for its faults
     return None if linkage is None or forces is None else (linkage, forces)
 
 
-def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
-    """An ideal linkage, and the bearings that its reactions load."""
-    drive = drive_of(mechanism.driver, alone=not scene.bearings)
-    linked, reactions = _linked(scene, mechanism, drive, NO_PLAY, errors), None
-    if linked is not None:
-        linkage, forces = linked
-        with _noted(errors):
-            loads = (*forces.loads, *loads_of_drive(linkage))
-            reactions = derive_reactions(mechanism, linkage, loads, _moments(scene, mechanism))
-    masses = []
-    for bearing in scene.bearings:
-        with _noted(errors):
-            masses.append(inner_mass(bearing, mechanism))
-    if linked is None or reactions is None or len(masses) < len(scene.bearings):
-        return None
-    own, rings = own_loads(scene), []
-    for bearing, mass in zip(scene.bearings, masses, strict=True):
-        share = reaction_share(scene, bearing, reactions).force
-        load = (share[0] + own.force[0], share[1] + own.force[1])
-        rings.append(_rings(bearing, _cage(bearing, mechanism, linkage), load, mass))
-    inertias, weights = inertia_of(mechanism, linkage)
-    return _of_rings(
-        scene,
-        rings,
-        errors,
-        drive=drive,
-        forces=forces,
-        inputs=(*drive.inputs, *forces.inputs, *own.inputs),
-        definitions=(
-            *(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions, *own.definitions),
-        ),
-        constants=(*forces.constants, *own.constants),
-        quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
-        requested=_requested(mechanism, linkage, reactions, forces, (*inertias, *work_of_drive(linkage)[1]), weights),
-        linkage=linkage,
-        reactions=reactions,
-    )
-
-
-def _cage(bearing: Bearing, mechanism: Mechanism, linkage: Linkage) -> Cage:
-    """Balls of a bearing at the driver's joint, whose play does not move the linkage."""
-    drive = linkage.drive
-    if isinstance(drive, KnownDrive) and drive.even:
-        return cage_on_shaft(bearing, drive)
-    carriers = linkage.pose(linkage.driven), linkage.pose(FRAME)
-    return cage_between(bearing, carriers, (WITH_DRIVER, STILL), mechanism.driver, drive)
-
-
-def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
-    """A linkage whose joints have the play of its bearings, or that a torque drives: one set of equations of motion."""
-    drive = drive_of(mechanism.driver, alone=not scene.bearings)
-    rings = [c for bearing in scene.bearings for c in own_coordinates(bearing)]
-    positions = tuple(c.position for c in rings)
-    # the heaviest last: M is factored in this order, without pivoting
-    coordinates = (*rings, *_driven(drive))
-    joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
-    play = {joints[b.name].name: play_of(b, joints[b.name], ring_coordinates(b)) for b in scene.bearings}
-    linked = _linked(scene, mechanism, drive, play, errors)
-    if linked is None:
-        return None
-    linkage, forces = linked
-    start = symbol_of(mechanism.driver.start_angle)
-    swings = {FRAME: STILL, linkage.driven: WITH_DRIVER}
-    cages, models, coupled = [], [], []
-    for bearing in scene.bearings:
-        bodies = (bearing.inner_body, joints[bearing.name].other(bearing.inner_body))
-        for body in bodies:
-            swings.setdefault(body, swing_of(linkage.pose(body), start, positions))
-        poses, turned = tuple(map(linkage.pose, bodies)), tuple(swings[body] for body in bodies)
-        cage = cage_between(bearing, (poses[0], poses[1]), (turned[0], turned[1]), mechanism.driver, drive)
-        cages.append(cage)
-        models.append(derive_bearing(bearing, cage))
-        coupled.append(couple(bearing, models[-1], mechanism, linkage))
-    loads = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
-    reactions = None
-    with _noted(errors):
-        reactions = derive_reactions(mechanism, linkage, loads, _moments(scene, mechanism))
-    if reactions is None:
-        return None
-    known = (
-        *drive.definitions,
-        *linkage.definitions,
-        *forces.definitions,
-        *(d for swing in swings.values() for d in swing.definitions),
-        *(d for cage in cages for d in cage.definitions),
-    )
-    inertias, weights = inertia_of(mechanism, linkage)
-    turned_by, turning = work_of_drive(linkage)
-    motion = LinearForms(known, coordinates).motion(
-        (*inertias, *turning, *(i for part in coupled for i in part.inertias)),
-        (*weights, *turned_by, *work_of(forces.loads, linkage), *(e for part in coupled for e in part.efforts)),
-    )
-    return _system(
-        scene,
-        models,
-        errors,
-        inputs=(*drive.inputs, *forces.inputs),
-        cages=cages,
-        drive=drive,
-        forces=forces,
-        definitions=(*known, *reactions.definitions, *motion.definitions),
-        linear_forms=motion.definitions,
-        constants=(
-            *forces.constants,
-            *(c for swing in swings.values() for c in swing.constants),
-            *(c for model in models for c in model.constants),
-        ),
-        quantities=(
-            *(output for model in models for output in bearing_outputs(model, None)),
-            *mechanism_outputs(mechanism, linkage, reactions),
-            *forces.outputs,
-        ),
-        requested=(
-            *_requested(
-                mechanism,
-                linkage,
-                reactions,
-                forces,
-                (*inertias, *turning, *(i for part in coupled for i in part.inertias)),
-                (*weights, *(e for part in coupled for e in part.weights)),
-            ),
-            *(
-                output
-                for bearing, model in zip(scene.bearings, models, strict=True)
-                for output in (
-                    *ring_outputs(model),
-                    *contact_outputs(bearing, model),
-                    *bearing_power_outputs(
-                        bearing, model, None, linkage.pose(joints[bearing.name].other(bearing.inner_body)).rate
-                    ),
-                )
-            ),
-        ),
-        mass=motion.mass,
-        forcing=motion.forcing,
-        linkage=linkage,
-        reactions=reactions,
-    )
-
-
-def _requested(
-    mechanism: Mechanism,
-    linkage: Linkage,
-    reactions: Reactions,
-    forces: Forces,
-    inertias: Sequence[Inertia],
-    weights: Sequence[Effort],
-) -> tuple[Output, ...]:
-    """Outputs of a mechanism on request."""
-    powers = power_outputs(linkage, reactions, loads=forces.of_each, inertias=inertias, weights=weights)
-    return (*motion_outputs(mechanism, linkage, reactions), *powers, *forces.requested)
-
-
-def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:
+def _moments(scene: Scene) -> frozenset[str]:
     """Guides on the frame whose moment is asked for."""
-    guides = (joint.name for joint in mechanism.joints if joint.kind == "prismatic")
+    joints = () if scene.mechanism is None else scene.mechanism.joints
+    guides = (joint.name for joint in joints if joint.kind == "prismatic")
     return frozenset(name for name in guides if is_asked(scene.outputs, f"reaction.{name}.moment"))
 
 
-def _driven(drive: Drive | None) -> tuple[Coordinate, ...]:
-    """The driver's angle where it is a state that its torque moves."""
-    return () if drive is None or drive.coordinate is None else (drive.coordinate,)
+def _motion(parts: _Parts) -> EquationsOfMotion:
+    """Equations of motion of all that moves with the linkage: rings in its joints, a driver that a torque turns."""
+    linkage, drive = parts.linkage, parts.drive
+    rings = (c for b in parts.scene.bearings if b.coupling == "two-way" for c in own_coordinates(b))
+    # the heaviest last: M is factored in this order, without pivoting
+    coordinates = (*rings, *(() if drive.coordinate is None else (drive.coordinate,)))
+    efforts: tuple[Effort, ...] = ()
+    if linkage is not None:
+        efforts = (*weights_of(linkage), *work_of_drive(drive), *work_of(parts.forces.loads, linkage))
+    efforts += tuple(effort for part in parts.coupled for effort in part.efforts)
+    return LinearForms(parts.definitions, coordinates).motion(parts.inertias, efforts)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rings:
-    """A bearing loaded one-way, and the motion of its balls."""
-
-    model: BearingModel
-    motion: RingMotion
-    cage: Cage
-
-
-def _rings(bearing: Bearing, cage: Cage, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr) -> _Rings:
-    model = derive_bearing(bearing, cage)
-    return _Rings(model=model, motion=ring_motion(bearing, model, load, mass), cage=cage)
+def _quantities(parts: _Parts) -> list[Output]:
+    """Outputs that a model has without request."""
+    found = [q for pair in zip(parts.models, parts.loads, strict=True) for q in bearing_outputs(*pair)]
+    if parts.linkage is not None and parts.reactions is not None:
+        found += mechanism_outputs(parts.linkage, parts.reactions)
+    return [*found, *parts.forces.outputs]
 
 
-def _of_rings(
-    scene: Scene,
-    rings: Sequence[_Rings],
-    errors: list[SceneError],
-    *,
-    inputs: tuple[Input, ...],
-    definitions: tuple[Definition, ...],
-    constants: tuple[Definition, ...] = (),
-    quantities: tuple[Output, ...] = (),
-    requested: tuple[Output, ...] = (),
-    linkage: Linkage | None = None,
-    reactions: Reactions | None = None,
-    drive: Drive | None = None,
-    forces: Forces | None = None,
-) -> System:
-    """The system of bearings that do not act back on what loads them."""
-    return _system(
-        scene,
-        [one.model for one in rings],
-        errors,
-        inputs=inputs,
-        cages=[one.cage for one in rings],
-        definitions=(*definitions, *(d for one in rings for d in one.cage.definitions)),
-        constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
-        quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
-        requested=(
-            *requested,
-            *(
-                output
-                for bearing, one in zip(scene.bearings, rings, strict=True)
-                for output in (
-                    *ring_outputs(one.model),
-                    *contact_outputs(bearing, one.model),
-                    *bearing_power_outputs(bearing, one.model, one.motion.load),
-                )
-            ),
-        ),
-        mass=sp.ImmutableMatrix(sp.diag(*(one.motion.mass for one in rings))),
-        forcing=sp.ImmutableMatrix(
-            sum(len(one.motion.forcing) for one in rings), 1, [e for one in rings for e in one.motion.forcing]
-        ),
-        linkage=linkage,
-        reactions=reactions,
-        drive=drive,
-        forces=forces,
-    )
+def _requested(parts: _Parts) -> list[Output]:
+    """Outputs on request, without sums of others."""
+    found, linkage, reactions = list[Output](), parts.linkage, parts.reactions
+    if linkage is not None and reactions is not None:
+        found += motion_outputs(linkage, reactions)
+        loads = parts.forces.of_each
+        found += power_outputs(linkage, reactions, loads=loads, inertias=parts.inertias, weights=parts.weights)
+    found += parts.forces.requested
+    rows = zip(parts.scene.bearings, parts.models, parts.loads, parts.rings, strict=True)
+    for bearing, model, load, (_, housing) in rows:
+        found += [*ring_outputs(model), *contact_outputs(bearing, model)]
+        found += bearing_power_outputs(bearing, model, load, housing.rate)
+    return found
 
 
-def _system(
-    scene: Scene,
-    bearings: Sequence[BearingModel],
-    errors: list[SceneError],
-    *,
-    cages: Sequence[Cage],
-    inputs: tuple[Input, ...],
-    definitions: tuple[Definition, ...],
-    constants: tuple[Definition, ...],
-    quantities: tuple[Output, ...],
-    requested: tuple[Output, ...],
-    mass: sp.ImmutableMatrix,
-    forcing: sp.ImmutableMatrix,
-    linkage: Linkage | None,
-    reactions: Reactions | None,
-    linear_forms: tuple[Definition, ...] = (),
-    drive: Drive | None = None,
-    forces: Forces | None = None,
-) -> System:
-    driven, lags = _driven(drive), [cage.lag for cage in cages if cage.lag is not None]
-    known = []
-    if isinstance(drive, KnownDrive) and drive.passive is not None:
-        driven, known = (drive.passive,), [drive.acceleration]
-    switches = (() if forces is None else forces.switches) + tuple(s for cage in cages for s in cage.switches)
-    inputs = (*inputs, *(i for cage in cages for i in cage.inputs))
-    for acceleration in (*known, *(rate for _, rate in lags)):
-        mass = sp.ImmutableMatrix(sp.diag(mass, 1))
-        forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([acceleration])))
-    outputs: tuple[Output, ...] = ()
-    requested = (*requested, *balance_outputs((*quantities, *requested)))
+def _system(parts: _Parts, errors: list[SceneError]) -> System:
+    scene, drive, forces, models, cages = parts.scene, parts.drive, parts.forces, parts.models, parts.cages
+    motion, followers = _motion(parts), parts.followers
+    quantities, requested, outputs = _quantities(parts), _requested(parts), tuple[Output, ...]()
     with _noted(errors):
-        outputs = select_outputs(quantities, requested, scene.outputs)
+        outputs = select_outputs(quantities, [*requested, *balance_outputs([*quantities, *requested])], scene.outputs)
     listed = {o.name for o in quantities}
     named = tuple(o for o in outputs if o.name not in listed)
+    driven = () if drive.coordinate is None else (drive.coordinate,)
+    switches = (*forces.switches, *(s for cage in cages for s in cage.switches))
+    inputs = (*drive.inputs, *forces.inputs, *parts.own.inputs, *(i for cage in cages for i in cage.inputs))
+    forcing = [
+        *(e for rings in parts.motions for e in rings.forcing),
+        *motion.forcing,
+        *(acceleration for _, acceleration in followers),
+    ]
     return System(
         scene=scene,
         parameters=tuple(
@@ -486,36 +390,50 @@ def _system(
         coordinates=(
             *(c for bearing in scene.bearings for c in own_coordinates(bearing)),
             *driven,
-            *(lag for lag, _ in lags),
+            *(coordinate for coordinate, _ in followers),
         ),
-        initial=_initial(scene, driven, [b for b, c in zip(scene.bearings, cages, strict=True) if c.lag is not None]),
-        constants=(*constants, *dict.fromkeys(c for o in named for c in o.constants)),
-        definitions=definitions,
-        mass=mass,
-        forcing=forcing,
-        linkage=linkage,
-        reactions=reactions,
-        linear_forms=linear_forms,
-        bearings=tuple(bearings),
+        initial=_initial(parts),
+        constants=(
+            *(c for swing in parts.swings for c in swing.constants),
+            *(c for model in models for c in model.constants),
+            *(c for motion in parts.motions for c in motion.constants),
+            *(*drive.constants, *forces.constants, *parts.own.constants),
+            *dict.fromkeys(c for o in named for c in o.constants),
+        ),
+        definitions=(
+            *parts.definitions,
+            *(() if parts.reactions is None else parts.reactions.definitions),
+            *(*parts.own.definitions, *motion.definitions),
+        ),
+        mass=sp.ImmutableMatrix(sp.diag(*(rings.mass for rings in parts.motions), motion.mass, *[1] * len(followers))),
+        forcing=sp.ImmutableMatrix(len(forcing), 1, forcing),
+        linkage=parts.linkage,
+        reactions=parts.reactions,
+        linear_forms=motion.definitions,
+        bearings=models,
         quantities=(*quantities, *named),
         outputs=outputs,
         smoothness=(
-            *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
-            *(("driver.torque", drive.smoothness) for _ in _driven(drive) if drive is not None),
-            *(() if forces is None else forces.smoothness),
+            *((f"{model.names.prefix}{name}", law.anywhere) for model in models for name, law in model.laws),
+            *(("driver.torque", drive.smoothness) for _ in driven),
+            *forces.smoothness,
         ),
-        events=events_of(inputs, bearings, switches),
+        events=events_of(inputs, models, switches),
         switches=switches,
     )
 
 
-def _initial(scene: Scene, driven: tuple[Coordinate, ...], lagging: Sequence[Bearing]) -> tuple[str, ...]:
+def _initial(parts: _Parts) -> tuple[str, ...]:
     """Parameters that hold the initial states: positions of all, then velocities."""
-    found: list[str] = []
-    for which, of_driver in (("position", "start_angle"), ("velocity", "speed")):
-        found += [q.path for bearing in scene.bearings for q in getattr(bearing.initial, which)]
-        if driven and scene.mechanism is not None:
-            found.append(getattr(scene.mechanism.driver, of_driver).path)
+    bearings, drive, found = parts.scene.bearings, parts.drive, list[str]()
+    integrated = drive.coordinate is not None or drive.passive is not None
+    for which, of_driver in (("position", drive.first_angle), ("velocity", drive.first_speed)):
+        found += [q.path for bearing in bearings for q in getattr(bearing.initial, which)]
+        found += [of_driver.name] * integrated
         # nothing depends on the integral of a lag
-        found += [b.cage.lag.path for b in lagging if b.cage is not None and b.cage.lag is not None]
+        found += [
+            bearing.cage.lag.path
+            for bearing, cage in zip(bearings, parts.cages, strict=True)
+            if cage.lag is not None and bearing.cage is not None and bearing.cage.lag is not None
+        ]
     return tuple(found)

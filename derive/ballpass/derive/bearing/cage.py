@@ -13,11 +13,10 @@ from ballpass.derive.bearing.cage_slip import excess_slip, kept_share, lag_at_ro
 from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
-from ballpass.derive.drive import Drive, KnownDrive, OverAngle
-from ballpass.derive.mechanism.kinematics import Ledger, Pose
+from ballpass.derive.drive import Drive, KnownDrive
+from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
 from ballpass.derive.variables import Coordinate, Input, StateSwitch, turned
 from ballpass.runtime.contract.manifest import TurningInfo
@@ -96,11 +95,11 @@ def _known(
     names: Names,
     part: str,
     turns: sp.Expr,
-    drive: KnownDrive | None,
+    drive: KnownDrive,
     slip: _Slip | None,
     each: sp.Expr = sp.S.One,
 ) -> _Known:
-    """Angle of ball 1, or of its material, that makes `turns` turns in one of the driver (`drive` is None: none).
+    """Angle of ball 1, or of its material, that makes `turns` turns in one of the driver.
 
     Parameters
     ----------
@@ -124,8 +123,7 @@ def _known(
         parts=1 if spins else bearing.balls,
     )
     constants: tuple[Definition, ...] = ()
-    even = drive is None or drive.even
-    if slip is not None or not even:
+    if slip is not None or not drive.even:
         each_turn = names.define(
             names.constant(f"{part}_turns"), turns, "1", f"Turns of {part.replace('_', ' ')} in one of the driver", "N"
         )
@@ -133,11 +131,10 @@ def _known(
         turning = replace(
             turning,
             turns=each_turn.symbol.name,
-            times=() if drive is None else drive.turning.times,
-            speeds=() if drive is None else drive.turning.speeds,
+            times=drive.turning.times,
+            speeds=drive.turning.speeds,
         )
-    passed = sp.S.Zero if drive is None else drive.passed
-    angle = speed * TIME if even else turns * passed
+    angle = speed * TIME if drive.even else turns * drive.passed
     if slip is not None:
         assert bearing.cage is not None  # its slip changes
         assert bearing.cage.lag is not None
@@ -155,65 +152,13 @@ def _known(
             lag_times=tuple(q.path for q in bearing.cage.time),
             lags=tuple(symbol.name for symbol in lag_names(bearing, names)),
         )
-        angle -= rolling * slip.excess.symbol * passed
+        angle -= rolling * slip.excess.symbol * drive.passed
     start = turned(turning, names.words(words), names.latex(latex))
     return _Known(angle=start.symbol + angle, turning=turning, input=start, constants=constants)
 
 
-def cage_on_shaft(bearing: Bearing, drive: KnownDrive | None, *, outer: bool = False) -> Cage:
-    """A ring at constant speed, the inner one or the `outer`; the other stands, Eq. (7).  A cage may lag."""
-    names = names_of(bearing)
-    shaft_speed = sp.S.Zero if drive is None else drive.speed
-    ring, share = ("outer", 1 - cage_ratio(names)) if outer else ("inner", cage_ratio(names))
-    speed, pass_speed = names.constant("cage_speed"), names.constant(f"{ring}_pass_speed")
-    turns, slip = kept_share(bearing) * share, _slip(bearing, names, share)
-    constants: tuple[Definition, ...] = (
-        _ratio(bearing, names),
-        names.define(speed, turns * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
-        _pass(names, ring, speed - shaft_speed),
-        *((_pass(names, "inner", speed),) if outer else ()),
-        *(() if slip is None else slip.constants),
-    )
-    still = _known(bearing, names, "cage", turns, drive, slip)
-    moving = _known(bearing, names, f"{ring}_pass", turns - 1, drive, slip)
-    over_outer, over_inner = (moving, still) if outer else (still, moving)
-    known, ledger, rate = [still, moving], Ledger(), speed
-    if slip is not None:
-        words = names.words("speed of the balls about the bearing's axis")
-        slower = speed - slip.rolling * slip.excess.symbol * shaft_speed
-        rate = ledger.define(f"{bearing.prefix}cage.rate", slower, "rad/s", words, names.latex(r"\dot\psi"))
-    spin: _Known | None = None
-    if _spins(bearing):
-        constants += _spin_constants(bearing, names, pass_speed if outer else speed)
-        of_ball = ball_turns(bearing) * (turns - 1 if outer else turns)
-        spin = _known(bearing, names, "spin", of_ball, drive, slip, ball_turns(bearing))
-        known.append(spin)
-    passes = Passing(
-        outer=(over_outer.angle, speed),
-        inner=(over_inner.angle, speed),
-        turnings={"outer": over_outer.turning, "inner": over_inner.turning}
-        | ({} if spin is None else {"spin": spin.turning}),
-    )
-    met = _met(bearing, names, passes)
-    return Cage(
-        angle=still.angle,
-        rate=rate,
-        in_outer=over_outer.angle,
-        in_inner=over_inner.angle,
-        inputs=(*(one.input for one in known), *(() if slip is None else (slip.excess,)), *met.inputs),
-        constants=(*constants, *(c for one in known for c in one.constants), *met.constants),
-        definitions=ledger.definitions,
-        spin=None if spin is None else spin.angle,
-        share=cage_ratio(names),
-    )
-
-
 #: What the angle of a ball's spin is.
 SPIN = "Angle of a ball's material that meets the outer raceway"
-
-
-def _spins(bearing: Bearing) -> bool:
-    return any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
 
 
 def _spin_constants(bearing: Bearing, names: Names, over_outer: sp.Expr) -> tuple[Definition, ...]:
@@ -231,44 +176,31 @@ def _spin_constants(bearing: Bearing, names: Names, over_outer: sp.Expr) -> tupl
     )
 
 
-def _met(bearing: Bearing, names: Names, passes: Passing) -> OverAngle:
-    """What effects bring besides their terms: constants, and where balls enter and leave spalls."""
-    found = [EFFECTS[e.kind].edges(e, bearing, names, passes) for e in bearing.effects]
-    return OverAngle(
-        value=sp.S.Zero,
-        constants=tuple(d for e in bearing.effects for d in EFFECTS[e.kind].constants(e, bearing, names, passes)),
-        inputs=tuple(i for one in found for i in one.inputs),
-        definitions=tuple(d for one in found for d in one.definitions),
-        switches=tuple(switch for one in found for switch in one.switches),
-    )
-
-
-def cage_between(
-    bearing: Bearing, bodies: tuple[Pose, Pose], swings: tuple[Swing, Swing], driver: Driver, drive: Drive
-) -> Cage:
-    """Rings that turn with two bodies: ``theta_0`` plus both angles since the start, each with its weight.
+def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
+    """Balls between two rings: ``theta_0`` plus the angles of both since the start, each with its weight, Eq. (7).
 
     Parameters
     ----------
-    bodies, swings : of the bodies that carry inner and outer ring
-    driver, drive : the driver of the scene, and how it moves; where a torque drives, constant speeds are initial ones
+    rings : how inner and outer ring turn
+    drive : what turns them; where a torque drives, constant speeds are initial ones
     """
-    names = names_of(bearing)
-    ledger = Ledger()
-    driver_speed, start = symbol_of(driver.speed), symbol_of(driver.start_angle)
-    speed, share = names.constant("cage_speed"), cage_ratio(names)
-    constants: tuple[Definition, ...] = (_ratio(bearing, names),)
-    about_inner = swings[0] is STILL
+    names, ledger = names_of(bearing), Ledger()
+    inner, outer = rings
+    known = drive if isinstance(drive, KnownDrive) else None
+    evenly = known is not None and inner.swing == outer.swing == 0
+    steady = evenly and drive.even and bearing.coupling == "one-way"
+    around, relative = inner.turns - outer.turns, inner.rate - outer.rate
+    apart = inner.swing - inner.at_start - outer.swing + outer.at_start
+    constants, share = [_ratio(bearing, names)], cage_ratio(names)
     if bearing.cage is not None and bearing.cage.slipping:
-        slipping = _slipping(bearing, names, about_inner=about_inner)
-        constants, share = (*constants, slipping), slipping.symbol
+        constants.append(_slipping(bearing, names, about_inner=inner is STILL))
+        share = constants[-1].symbol
     # of the last row, as are all angles less the lag
     weights = (share, 1 - share)
-    swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
-    turns = sum((w * s.turns for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
-    rolling = cage_ratio(names) - (1 if about_inner else 0)
-    slip = _slip(bearing, names, rolling * (swings[0].turns - swings[1].turns))
-    share_now = share
+    swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, rings, strict=True)), start=sp.S.Zero)
+    turns = sum((w * s.turns for w, s in zip(weights, rings, strict=True)), start=sp.S.Zero)
+    rolling = cage_ratio(names) - (1 if inner is STILL else 0)
+    slip, share_now = _slip(bearing, names, rolling * around), share
     if slip is not None:
         share_now = ledger.define(
             f"{bearing.prefix}cage.share",
@@ -277,103 +209,84 @@ def cage_between(
             "share of the inner ring's speed in that of the cage",
             names.latex(r"\kappa_c(t)"),
         )
-        constants = (*constants, *slip.constants)
-    rate = ledger.define(
-        f"{bearing.prefix}cage.rate",
-        sum((w * body.rate for w, body in zip((share_now, 1 - share_now), bodies, strict=True)), start=sp.S.Zero),
-        "rad/s",
-        names.words("speed of the balls about the bearing's axis"),
-        names.latex(r"\dot\psi"),
-    )
-    words = "Mean speed of the balls about the bearing's axis"
-    constants += (
-        names.define(
-            names.constant("ring_speed"),
-            (swings[0].turns - swings[1].turns) * driver_speed,
+        constants += slip.constants
+    if bearing.coupling == "two-way":  # else it is that of driver or shaft
+        words = "Mean speed of the inner ring relative to the outer one"
+        ring_speed = names.constant("ring_speed")
+        constants.append(names.define(ring_speed, around * drive.first_speed, "rad/s", words, r"\omega_{io}"))
+    speed = names.constant("cage_speed")
+    constants.append(names.define(speed, turns * drive.first_speed, "rad/s", "Mean speed of the cage", r"\omega_c"))
+    rate = speed
+    if slip is not None or not steady:
+        rate = ledger.define(
+            f"{bearing.prefix}cage.rate",
+            share_now * inner.rate + (1 - share_now) * outer.rate,
             "rad/s",
-            "Mean speed of the inner ring relative to the outer one",
-            r"\omega_{io}",
-        ),
-        names.define(speed, turns * driver_speed, "rad/s", words, r"\omega_c"),
-    )
-    inner, outer = swings
-    apart = inner.swing - inner.at_start - outer.swing + outer.at_start
-    around = inner.turns - outer.turns
-    known_drive = drive if isinstance(drive, KnownDrive) else None
+            names.words("speed of the balls about the bearing's axis"),
+            names.latex(r"\dot\psi"),
+        )
     # a lag between rings that turn with a known driver is known; else it is a state
-    evenly = known_drive is not None and all(one.swing == 0 for one in swings)
     lag = None if slip is None or evenly else lag_coordinate(bearing, names)
     behind = sp.S.Zero if lag is None else lag.velocity
-    known: list[_Known] = []
+    angles: list[_Known] = []
 
-    def ball(part: str, turns: sp.Expr, swung: sp.Expr) -> sp.Expr:
-        """Angle of ball 1, of which so many turns go with the driver's."""
-        if known_drive is None:
-            return symbol_of(bearing.ball_angle) + turns * (drive.angle - start) + swung - behind
-        known.append(_known(bearing, names, part, turns, known_drive, slip if evenly else None))
-        return known[-1].angle + swung - behind
+    def ball(part: str, turns: sp.Expr, swung: sp.Expr, each: sp.Expr = sp.S.One) -> sp.Expr:
+        """Angle of ball 1, or of its material, of which so many turns go with the driver's."""
+        swung -= each * behind
+        if known is None:
+            start = sp.S.Zero if part == "spin" else symbol_of(bearing.ball_angle)
+            return start + turns * (drive.angle - drive.first_angle) + swung
+        angles.append(_known(bearing, names, part, turns, known, slip if evenly else None, each))
+        return angles[-1].angle + swung
 
-    angle, in_outer, over_outer = ball("cage", turns, swung), None, speed
-    if outer is not STILL:
-        constants += (_pass(names, "outer", share * names.constant("ring_speed")),)
-        in_outer, over_outer = ball("outer_pass", share * around, share * apart), names.constant("outer_pass_speed")
-    constants += (_pass(names, "inner", (share - 1) * names.constant("ring_speed")),)
-    in_inner = ball("inner_pass", (share - 1) * around, (share - 1) * apart)
+    angle = ball("cage", turns, swung)
+    seen = {"outer": angle, "inner": angle}
+    for ring, turning, its in (("outer", outer, share), ("inner", inner, share - 1)):
+        if turning is not STILL:
+            seen[ring] = ball(f"{ring}_pass", its * around, its * apart)
+        if turning is not STILL or ring == "inner":
+            constants.append(_pass(names, ring, speed - turning.turns * drive.first_speed))
     ring_rate: sp.Symbol | None = None
-    if bearing.effects or lag is not None:
+    if (bearing.effects or lag is not None) and not steady:
         ring_rate = ledger.define(
             f"{bearing.prefix}cage.ring_rate",
-            bodies[0].rate - bodies[1].rate,
+            relative,
             "rad/s",
             "speed of the inner ring relative to the outer one",
             names.latex(r"\omega_{io}"),
         )
-    cage = Cage(
+    rolls, spin = ball_turns(bearing), None
+    if any(EFFECTS[e.kind].spins(e) for e in bearing.effects):
+        constants += _spin_constants(bearing, names, speed if outer is STILL else names.constant("outer_pass_speed"))
+        spin = ball("spin", rolls * share * around, rolls * share * apart, rolls)
+    moving = relative if ring_rate is None else ring_rate
+    turnings = {one.turning.name.removeprefix(bearing.prefix).removesuffix("_pass"): one.turning for one in angles}
+    passes = Passing(
+        outer=(seen["outer"], share_now * moving),
+        inner=(seen["inner"], (share_now - 1) * moving),
+        spin=None if spin is None else (spin, rolls * share_now * moving),
+        turnings={"outer": turnings["cage"], "inner": turnings["cage"]} | turnings if evenly else None,
+    )
+    met = [EFFECTS[e.kind].edges(e, bearing, names, passes) for e in bearing.effects]
+    constants += [c for one in angles for c in one.constants]
+    constants += [c for e in bearing.effects for c in EFFECTS[e.kind].constants(e, bearing, names)]
+    return Cage(
         angle=angle,
         rate=rate,
-        in_outer=angle if in_outer is None else in_outer,
-        in_inner=in_inner,
-        inputs=(*(one.input for one in known), *(() if slip is None else (slip.excess,))),
-        constants=(*constants, *(c for one in known for c in one.constants)),
-        definitions=ledger.definitions,
-        share=share_now,
-        lag=None
-        if lag is None or slip is None or ring_rate is None
-        else (lag, rolling * slip.excess.symbol * ring_rate),
-    )
-    if not bearing.effects:
-        return cage
-    assert ring_rate is not None  # of effects
-    rolls, spin, inputs = ball_turns(bearing), None, cage.inputs
-    constants = cage.constants
-    turnings = {one.turning.name.removeprefix(bearing.prefix).removesuffix("_pass"): one.turning for one in known}
-    if evenly and outer is STILL:
-        turnings["outer"] = turnings["cage"]
-    if _spins(bearing):
-        constants += _spin_constants(bearing, names, over_outer)
-        rolled_on = share * (around * (drive.angle - start) + apart) - behind
-        spin = rolls * rolled_on
-        if known_drive is not None:
-            over = _known(bearing, names, "spin", rolls * share * around, known_drive, slip if evenly else None, rolls)
-            spin = over.angle + rolls * (share * apart - behind)
-            inputs, constants = (*inputs, over.input), (*constants, *over.constants)
-            turnings["spin"] = over.turning
-    rates = (share_now * ring_rate, (share_now - 1) * ring_rate)
-    passes = Passing(
-        outer=(cage.in_outer, rates[0]),
-        inner=(in_inner, rates[1]),
-        spin=None if spin is None else (spin, rolls * rates[0]),
-        turnings=turnings if evenly else None,
-    )
-    met = _met(bearing, names, passes)
-    return replace(
-        cage,
-        inputs=(*inputs, *met.inputs),
-        constants=(*constants, *met.constants),
-        definitions=(*ledger.definitions, *met.definitions),
+        in_outer=seen["outer"],
+        in_inner=seen["inner"],
+        inputs=(
+            *(one.input for one in angles),
+            *(() if slip is None else (slip.excess,)),
+            *(i for one in met for i in one.inputs),
+        ),
+        constants=tuple(constants),
+        definitions=(*ledger.definitions, *(d for one in met for d in one.definitions)),
         spin=spin,
+        share=share_now,
         ring_rate=ring_rate,
-        switches=met.switches,
+        switches=tuple(switch for one in met for switch in one.switches),
+        lag=None if lag is None or slip is None else (lag, rolling * slip.excess.symbol * moving),
     )
 
 

@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.drive import KnownDrive, shaft_drive
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.kinematics import Pair, add, scale
+from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber
@@ -43,25 +45,29 @@ class RingLoad:
     definitions: tuple[Definition, ...] = ()
 
 
-def reaction_share(scene: Scene, bearing: Bearing, reactions: Reactions) -> RingLoad:
-    """Share of the reaction of the bearing's joint: the force of the body it carries on the frame."""
-    assert scene.mechanism is not None
-    assert bearing.joint is not None
-    assert bearing.share is not None
-    fx, fy = reactions.joint_force[bearing.joint]
-    share = symbol_of(bearing.share)
-    sign = 1 if scene.mechanism.joint(bearing.joint).bodies[0] == FRAME else -1
-    return RingLoad(force=(sign * share * fx, sign * share * fy))
+def load_on(bearing: Bearing, own: RingLoad, linkage: Linkage | None, reactions: Reactions | None) -> Pair | None:
+    """Force on an inner ring that is loaded one-way: its share of the reaction of its joint, and loads of the scene.
+
+    On a shaft it has a share of these; the reaction is that of the body it carries on the frame.
+    """
+    share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
+    if linkage is None or reactions is None:
+        return scale(share, own.force)
+    if bearing.coupling == "two-way":
+        return None
+    joint = linkage.driver  # the reader refuses another one
+    sign = 1 if joint.bodies[0] == FRAME else -1
+    return add(scale(sign * share, reactions.joint_force[joint.name]), own.force)
 
 
-def own_loads(scene: Scene) -> RingLoad:
-    """Sum of the loads that a scene gives itself; every bearing of the scene carries it."""
-    shaft = shaft_drive(scene.shaft) if scene.shaft is not None and any(load.turns for load in scene.loads) else None
-    parts = [] if shaft is None else [_turning(shaft)]
-    for load in scene.loads:
-        assert shaft is not None or not load.turns  # the reader refuses these beside a mechanism
-        parts.append(_windowed(load, _unwindowed(load, shaft), shaft))
-    return _sum(parts)
+def own_loads(scene: Scene, drive: Drive) -> RingLoad:
+    """Sum of the loads that a scene gives itself; every bearing of the scene carries it.
+
+    Parameters
+    ----------
+    drive : of the shaft, whose angle some follow; beside a mechanism the reader refuses these
+    """
+    return _sum(_windowed(load, _unwindowed(load, drive), drive) for load in scene.loads)
 
 
 def _sum(parts: Iterable[RingLoad]) -> RingLoad:
@@ -76,41 +82,20 @@ def _sum(parts: Iterable[RingLoad]) -> RingLoad:
     return total
 
 
-def _turning(shaft: KnownDrive) -> RingLoad:
-    """What the loads that follow the shaft's angle share: no force."""
-    zero = Definition(
-        symbol=sp.Symbol(shaft.turning.offset, real=True),
-        expression=sp.S.Zero,
-        unit="rad",
-        description="Angle of the shaft at t = 0",
-        latex=r"\theta_s",
-    )
-    angle = Definition(
-        symbol=shaft.angle,
-        expression=shaft.inputs[0].symbol + shaft.passed,
-        unit="rad",
-        description="Angle of the shaft",
-        latex=r"\theta",
-    )
-    return RingLoad(force=(sp.S.Zero, sp.S.Zero), inputs=shaft.inputs, constants=(zero,), definitions=(angle,))
-
-
-def _unwindowed(load: Load, shaft: KnownDrive | None) -> RingLoad:
+def _unwindowed(load: Load, shaft: Drive) -> RingLoad:
     law = load.law
     if isinstance(law, ConstantLoad):
         return RingLoad(force=components(law.force))
     if isinstance(law, HarmonicLoad):
         return _harmonic(load, law)
     if isinstance(law, UnbalanceLoad):
-        assert shaft is not None
         return _unbalance(load, law, shaft)
     return _over_time(load, law) if law.over == "time" else _over_angle(load, law, shaft)
 
 
-def _windowed(load: Load, full: RingLoad, shaft: KnownDrive | None) -> RingLoad:
+def _windowed(load: Load, full: RingLoad, shaft: Drive) -> RingLoad:
     """The load times 1 within its windows and 0 outside."""
     if load.angle_window is not None and load.angle_window.end is not None:
-        assert shaft is not None
         gate = shaft.gate(load.label, [(load.angle_window.start.path, load.angle_window.end.path)])
         full = _times(gate.value, full, gate.inputs)
     if load.time_window is not None:
@@ -153,7 +138,7 @@ def _within_times(load: Load, window: LoadWindow, full: RingLoad) -> RingLoad:
     return _times(gate.symbol, full, (gate,), constants)
 
 
-def _unbalance(load: Load, law: UnbalanceLoad, shaft: KnownDrive) -> RingLoad:
+def _unbalance(load: Load, law: UnbalanceLoad, shaft: Drive) -> RingLoad:
     """Centrifugal force m_u e_u omega^2 of a mass that turns with the shaft."""
     amount = Definition(
         symbol=sp.Symbol(f"{load.path}.centrifugal_force", real=True),
@@ -209,8 +194,7 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
     )
 
 
-def _over_angle(load: Load, law: TableLoad, shaft: KnownDrive | None) -> RingLoad:
-    assert shaft is not None
+def _over_angle(load: Load, law: TableLoad, shaft: Drive) -> RingLoad:
     angles = [q.path for q in law.rows]
     x, y = (
         shaft.table(f"{load.label}.{axis}", "N", angles, [q.path for q in values])

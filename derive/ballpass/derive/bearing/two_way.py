@@ -21,7 +21,7 @@ from ballpass.derive.mechanism.kinematics import ZERO, Motion, add, body_point, 
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.records import FRAME, Joint, Mechanism
+from ballpass.derive.scene.records import FRAME, Joint
 from ballpass.derive.terms import components, symbol_of
 from ballpass.derive.variables import Coordinate
 
@@ -64,12 +64,18 @@ def play_of(bearing: Bearing, joint: Joint, coordinates: tuple[Coordinate, ...])
     )
 
 
-def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage: Linkage) -> Coupled:
+def carriers_of(bearing: Bearing, linkage: Linkage) -> tuple[str, str]:
+    """The bodies that carry inner and outer ring: one-way the driven body and the frame."""
+    if bearing.coupling == "one-way":
+        return linkage.driven, FRAME
+    return bearing.inner_body, linkage.mechanism.joint(bearing.joint or "").other(bearing.inner_body)
+
+
+def couple(bearing: Bearing, model: BearingModel, linkage: Linkage) -> Coupled:
     """Forces of the balls on both bodies, and the outer ring where it moves on its own."""
-    assert bearing.joint is not None
-    joint, ball = mechanism.joint(bearing.joint), model.ball
+    mechanism, ball, bodies = linkage.mechanism, model.ball, carriers_of(bearing, linkage)
+    joint = mechanism.joint(bearing.joint or "")
     count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
-    bodies = (bearing.inner_body, joint.other(bearing.inner_body))
     inner = ring(model.coordinates, 0)
     outer = (
         ring(model.coordinates, 2)
@@ -90,7 +96,7 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
         torques = [torques[0] + torque, torques[1] - torque]
     carried, inertias, weights = ZERO, list[Inertia](), list[Effort]()
     if bearing.outer is not None:
-        housing, turning = linkage.motion(mechanism, bodies[1], joint.point(bodies[1])), linkage.pose(bodies[1]).rate
+        housing, turning = linkage.motion(bodies[1], joint.point(bodies[1])), linkage.pose(bodies[1]).rate
         mass, stiffness, damping = (
             count * symbol_of(q) for q in (bearing.outer.mass, bearing.outer.stiffness, bearing.outer.damping)
         )

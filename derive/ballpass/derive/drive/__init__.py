@@ -1,14 +1,18 @@
-"""What turns the driver's joint: a constant speed, a table of speeds over time, or a torque by a law in `laws`."""
+"""What turns the driver's joint or a shaft: a constant speed, a table of speeds over time, a torque by a law."""
 
 from ballpass.derive.drive.by_torque import by_torque
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.known import KnownDrive, known_drive, shaft_drive
 from ballpass.derive.drive.laws import LAWS
-from ballpass.derive.scene.records import Driver
+from ballpass.derive.scene.records import Scene
 
-__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of", "shaft_drive"]
+__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of"]
 
 
-def drive_of(driver: Driver, *, alone: bool) -> Drive:
-    """The drive that a scene asks for; `alone` as for `known_drive`."""
-    return known_drive(driver, alone=alone) if driver.torque is None else by_torque(driver)
+def drive_of(scene: Scene) -> Drive:
+    """What turns the driver of a scene's mechanism, or its shaft."""
+    if scene.mechanism is None:
+        assert scene.shaft is not None  # one of the two turns the bearings
+        return shaft_drive(scene.shaft, angle_used=any(load.turns for load in scene.loads))
+    driver = scene.mechanism.driver
+    return known_drive(driver, alone=not scene.bearings) if driver.torque is None else by_torque(driver)

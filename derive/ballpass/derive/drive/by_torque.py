@@ -22,9 +22,12 @@ def by_torque(driver: Driver) -> AngleState:
     return AngleState(
         speed=angle.velocity,
         acceleration=angle.acceleration,
+        first_angle=symbol_of(driver.start_angle),
+        first_speed=symbol_of(driver.speed),
         description="from the equations of motion",
         definitions=(torque,),
         coordinate=angle,
+        whole=angle.position,
         torque=torque.symbol,
         smoothness=driver.torque.smoothness,
         flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),

@@ -39,10 +39,13 @@ class Drive(ABC):
     ----------
     angle : of the driven body's x axis from +x [rad]
     speed, acceleration : of the same [rad/s], [rad/s^2]
+    first_angle, first_speed : of the start, parameters [rad], [rad/s]
     description : of the acceleration, as text
-    definitions : of the symbols in these, ordered
+    constants, definitions : of the symbols in these, ordered
     inputs : that these need
-    coordinate : the angle, where it is a state; without a `torque` its acceleration is known
+    coordinate : the angle, where it is a state
+    passive : the angle as a coordinate on which nothing depends, in a scene that has no other one, where it is known
+    whole : the angle with its whole turns, where the speed changes [rad]
     torque : on the driven body [N*m]; None where it follows from a given motion
     flywheel : moment of inertia that turns with the driven body [kg*m^2]
     smoothness : of the torque
@@ -51,13 +54,23 @@ class Drive(ABC):
     angle: sp.Expr = DRIVER_ANGLE
     speed: sp.Expr
     acceleration: sp.Expr
+    first_angle: sp.Expr
+    first_speed: sp.Expr
     description: str
+    constants: tuple[Definition, ...] = ()
     definitions: tuple[Definition, ...] = ()
     inputs: tuple[Input, ...] = ()
     coordinate: Coordinate | None = None
+    passive: Coordinate | None = None
+    whole: sp.Expr | None = None
     torque: sp.Expr | None = None
     flywheel: sp.Expr = sp.S.Zero
     smoothness: Smoothness = Smoothness.TWICE_SMOOTH
+
+    @property
+    def even(self) -> bool:
+        """Whether the speed is constant."""
+        return False
 
     @abstractmethod
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:

@@ -16,7 +16,7 @@ from ballpass.derive.drive.angle_state import driver_coordinate
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.scene.records import Driver, Shaft
 from ballpass.derive.terms import TIME, Definition, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, turned
+from ballpass.derive.variables import DRIVER_ANGLE, Input, turned
 from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, TurningInfo
 
 
@@ -28,14 +28,10 @@ class KnownDrive(Drive):
     ----------
     turning : its angle over time
     passed : what it turned since the reference time [rad]
-    passive : the angle as a coordinate on which nothing depends, in a scene that has no other one; None else
-    whole : the angle with its whole turns, where the speed changes [rad]
     """
 
     turning: TurningInfo
     passed: sp.Expr
-    passive: Coordinate | None = None
-    whole: sp.Expr | None = None
 
     @property
     def even(self) -> bool:
@@ -85,35 +81,21 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     ----------
     alone : whether nothing else has states; the driver's angle by a table is then integrated along, for runs need one
     """
-    words = "Angle of the driven body at the reference time"
-    speeds: tuple[str, ...] = (driver.speed.path,)
-    times: tuple[str, ...] = ()
-    if driver.table is not None:
-        speeds = (*speeds, *(q.path for q in driver.table.later_speed))
-        times = tuple(q.path for q in driver.table.time)
+    body, first_angle = "the driven body", symbol_of(driver.start_angle)
     turning = TurningInfo(
         name="driver",
         kind="driver",
         words="the driver",
         offset=driver.start_angle.path,
         rate=driver.speed.path,
-        times=times,
-        speeds=speeds,
+        speeds=(driver.speed.path,),
     )
-    start = turned(turning, words, r"\theta_{1,0}")
-    if not times:
-        passed = symbol_of(driver.speed) * TIME
-        angle = _angle(start, passed)
-        return KnownDrive(
-            speed=symbol_of(driver.speed),
-            acceleration=sp.S.Zero,
-            description="the driver's speed is constant",
-            definitions=(angle,),
-            inputs=(start,),
-            turning=turning,
-            passed=passed,
-        )
-    rate = turned(turning, "Speed of the driven body at the reference time", r"\omega_{1,0}", "rate")
+    if driver.table is None:
+        return _at_constant_speed(turning, body, DRIVER_ANGLE, (r"\theta_1", r"\theta_{1,0}"), first_angle)
+    speeds = (driver.speed, *driver.table.later_speed)
+    turning = replace(turning, times=tuple(q.path for q in driver.table.time), speeds=tuple(q.path for q in speeds))
+    start = turned(turning, f"Angle of {body} at the reference time", r"\theta_{1,0}")
+    rate = turned(turning, f"Speed of {body} at the reference time", r"\omega_{1,0}", "rate")
     slope = Input(
         name=DRIVER_ACCELERATION,
         symbol=sp.Symbol("input.driver.acceleration", real=True),
@@ -127,17 +109,19 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
         symbol=sp.Symbol("driver.rate", real=True),
         expression=rate.symbol + slope.symbol * TIME,
         unit="rad/s",
-        description="Speed of the driven body",
+        description=f"Speed of {body}",
         latex=r"\omega_1",
     )
     passed = (rate.symbol + slope.symbol * TIME / 2) * TIME
-    whole = turned(turning, "Angle of the driven body, whole turns counted", r"\theta_{1,0}", "angle")
+    whole = turned(turning, f"Angle of {body}, whole turns counted", r"\theta_{1,0}", "angle")
     passive = replace(driver_coordinate(), position=sp.Symbol("state.driver.angle", real=True)) if alone else None
     return KnownDrive(
         speed=speed.symbol,
         acceleration=slope.symbol,
+        first_angle=first_angle,
+        first_speed=symbol_of(driver.speed),
         description="slope of the table of the driver's speed",
-        definitions=(_angle(start, passed), speed),
+        definitions=(_angle(body, DRIVER_ANGLE, start, passed, r"\theta_1"), speed),
         inputs=(start, rate, slope, *(() if alone else (whole,))),
         flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),
         turning=turning,
@@ -147,33 +131,61 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     )
 
 
-def _angle(start: Input, passed: sp.Expr) -> Definition:
-    return Definition(
-        symbol=DRIVER_ANGLE,
-        expression=start.symbol + passed,
+def shaft_drive(shaft: Shaft, *, angle_used: bool) -> KnownDrive:
+    """The shaft's angle, zero at t = 0.
+
+    Parameters
+    ----------
+    angle_used : whether a load follows it; balls know their own
+    """
+    zero = Definition(
+        symbol=sp.Symbol("shaft.start_angle", real=True),
+        expression=sp.S.Zero,
         unit="rad",
-        description="Angle of the driven body",
-        latex=r"\theta_1",
+        description="Angle of the shaft at t = 0",
+        latex=r"\theta_s",
     )
-
-
-def shaft_drive(shaft: Shaft) -> KnownDrive:
-    """The shaft's angle, zero at t = 0."""
     turning = TurningInfo(
         name="shaft",
         kind="driver",
         words="the shaft",
-        offset="shaft.start_angle",
+        offset=zero.symbol.name,
         rate=shaft.speed.path,
         speeds=(shaft.speed.path,),
     )
-    speed = symbol_of(shaft.speed)
+    angle = sp.Symbol("shaft.angle", real=True)
+    drive = _at_constant_speed(turning, "the shaft", angle, (r"\theta", r"\theta_0"), zero.symbol)
+    if not angle_used:
+        return replace(drive, definitions=(), inputs=())
+    return replace(drive, constants=(zero,))
+
+
+def _at_constant_speed(
+    turning: TurningInfo, body: str, angle: sp.Symbol, latex: tuple[str, str], first_angle: sp.Expr
+) -> KnownDrive:
+    """Drive of driver or shaft.
+
+    Parameters
+    ----------
+    latex : of the angle, and of that at the reference time
+    """
+    speed = sp.Symbol(turning.rate, real=True)
+    start = turned(turning, f"Angle of {body} at the reference time", latex[1])
     return KnownDrive(
-        angle=sp.Symbol("shaft.angle", real=True),
+        angle=angle,
         speed=speed,
         acceleration=sp.S.Zero,
-        description="the shaft's speed is constant",
-        inputs=(turned(turning, "Angle of the shaft at the reference time", r"\theta_0"),),
+        first_angle=first_angle,
+        first_speed=speed,
+        description=f"{turning.words}'s speed is constant",
+        definitions=(_angle(body, angle, start, speed * TIME, latex[0]),),
+        inputs=(start,),
         turning=turning,
         passed=speed * TIME,
+    )
+
+
+def _angle(body: str, angle: sp.Symbol, start: Input, passed: sp.Expr, latex: str) -> Definition:
+    return Definition(
+        symbol=angle, expression=start.symbol + passed, unit="rad", description=f"Angle of {body}", latex=latex
     )

@@ -135,7 +135,10 @@ class LinearForms:
         mass = [[sp.S.Zero] * size for _ in range(size)]
         forcing = [sp.S.Zero] * size
         for inertia in inertias:
-            along, bias = self.columns(inertia.rate), self.bias(inertia.acceleration)
+            along = self.columns(inertia.rate)
+            if not any(along):
+                continue
+            bias = self.bias(inertia.acceleration)
             for i in range(size):
                 if along[i] == 0:
                     continue

@@ -66,6 +66,7 @@ class Linkage:
     play : joints whose two points do not coincide
     """
 
+    mechanism: Mechanism
     drive: Drive
     driver: Joint
     driven: str
@@ -95,9 +96,9 @@ class Linkage:
         """Pose of a moving body or of the frame."""
         return frame_pose() if body == FRAME else self.poses[body]
 
-    def motion(self, mechanism: Mechanism, body: str, point: str) -> Motion:
+    def motion(self, body: str, point: str) -> Motion:
         """Motion of a named point of a body."""
-        return self.pose(body).motion(body_point(mechanism, body, point))
+        return self.pose(body).motion(body_point(self.mechanism, body, point))
 
 
 def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> Linkage:
@@ -127,6 +128,7 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> 
         placements.append(placement)
     moving = {name: pose for name, pose in poses.items() if name != FRAME}
     return Linkage(
+        mechanism=mechanism,
         drive=drive,
         driver=assembly.driver,
         driven=assembly.driven,

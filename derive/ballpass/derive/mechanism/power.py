@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import ZERO
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import components, symbol_of
 
 
@@ -27,13 +27,9 @@ def work_of(loads: Iterable[AppliedLoad], linkage: Linkage) -> tuple[Effort, ...
     return tuple(effort for effort in efforts if effort.amount != 0 and effort.rate != 0)
 
 
-def work_of_drive(linkage: Linkage) -> tuple[tuple[Effort, ...], tuple[Inertia, ...]]:
-    """Work of a drive's torque, and its flywheel; nothing where the speed is constant, no work where it is given."""
-    drive = linkage.drive
-    wheel = Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration)
-    if drive.torque is None:
-        return (), (wheel,) if drive.flywheel != 0 else ()
-    return (Effort(amount=drive.torque, rate=drive.speed),), (wheel,)
+def work_of_drive(drive: Drive) -> tuple[Effort, ...]:
+    """Work of a drive's torque; none where its motion is given."""
+    return () if drive.torque is None else (Effort(amount=drive.torque, rate=drive.speed),)
 
 
 def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
@@ -44,16 +40,31 @@ def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
     )
 
 
-def inertia_of(mechanism: Mechanism, linkage: Linkage) -> tuple[tuple[Inertia, ...], tuple[Effort, ...]]:
-    """Inertia of the bodies, and the work of their weight."""
-    gravity = ZERO if mechanism.gravity is None else components(mechanism.gravity, axis=(0, -1))
-    inertias, efforts = [], []
-    for body in mechanism.bodies:
+def inertia_of(linkage: Linkage) -> tuple[Inertia, ...]:
+    """Inertia of the bodies and of a drive's flywheel."""
+    inertias, drive = [], linkage.drive
+    for body in linkage.mechanism.bodies:
         pose, mass = linkage.poses[body.name], symbol_of(body.mass)
         center = pose.center_of_mass
-        for r, v, a, g in zip(center.position, center.velocity, center.acceleration, gravity, strict=True):
-            inertias.append(Inertia(amount=mass, rate=v, acceleration=a))
-            efforts.append(Effort(amount=mass * g, rate=v, place=r))
+        inertias += [
+            Inertia(amount=mass, rate=v, acceleration=a)
+            for v, a in zip(center.velocity, center.acceleration, strict=True)
+        ]
         if body.inertia is not None and pose.rate != 0:
             inertias.append(Inertia(amount=symbol_of(body.inertia), rate=pose.rate, acceleration=pose.acceleration))
-    return tuple(inertias), tuple(effort for effort in efforts if effort.amount != 0)
+    if drive.flywheel != 0:
+        inertias.append(Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration))
+    return tuple(inertias)
+
+
+def weights_of(linkage: Linkage) -> tuple[Effort, ...]:
+    """Work of the weight of the bodies."""
+    mechanism = linkage.mechanism
+    gravity = ZERO if mechanism.gravity is None else components(mechanism.gravity, axis=(0, -1))
+    return tuple(
+        Effort(amount=symbol_of(body.mass) * g, rate=v, place=r)
+        for body in mechanism.bodies
+        for center in [linkage.poses[body.name].center_of_mass]
+        for r, v, g in zip(center.position, center.velocity, gravity, strict=True)
+        if g != 0
+    )

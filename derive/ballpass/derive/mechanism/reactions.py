@@ -49,14 +49,12 @@ class Reactions:
     drive_torque: sp.Expr
 
 
-def derive_reactions(
-    mechanism: Mechanism, linkage: Linkage, loads: Sequence[AppliedLoad], moments: frozenset[str]
-) -> Reactions:
+def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: frozenset[str]) -> Reactions:
     """Derive A r = b and its solution.
 
     Parameters
     ----------
-    mechanism, linkage : the linkage and its kinematics
+    linkage : from `derive_linkage`
     loads : applied forces and torques
     moments : prismatic joints on the frame whose guide moment is wanted; each adds the moment balance of its slider
 
@@ -65,6 +63,7 @@ def derive_reactions(
     LinkageError
         a body without inertia whose moment balance is needed; `moments` names a joint that is not prismatic.
     """
+    mechanism = linkage.mechanism
     guides = {p.guide.joint.name: p.guide for p in linkage.placements if p.guide is not None}
     _refuse(mechanism, guides, moments)
     driver, driven = linkage.driver, linkage.driven

@@ -1,6 +1,7 @@
 """Angles of bodies that are continuous over any number of turns, as balls need them.
 
-In: the pose of a body.  Out: the angle as whole turns with the driver, a mean direction, and a swing about both.
+In: a linkage and one of its bodies.  Out: the angle as whole turns with the driver, a mean direction, and a swing about
+both.
 
 The pose gives cosine and sine of an angle.  In a turn of the driver the body makes N whole turns, and swings by less
 than half a turn about N theta + m; so the angle is N theta + m + atan2(sine, cosine of the rest), without a jump.  N
@@ -14,7 +15,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.mechanism.kinematics import Pose, subscript
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.kinematics import subscript
+from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import DRIVER_ANGLE
 
@@ -59,34 +62,35 @@ class Swing:
     turns : whole turns in a turn of the driver, a constant
     swing : rest of the angle, mean direction included [rad]
     at_start : the same in the ideal linkage at the driver's start angle [rad]
+    rate : of the angle [rad/s]
     constants, definitions : of the symbols in these
     """
 
     turns: sp.Expr
-    swing: sp.Expr
-    at_start: sp.Expr
+    swing: sp.Expr = sp.S.Zero
+    at_start: sp.Expr = sp.S.Zero
+    rate: sp.Expr
     constants: tuple[Definition, ...] = ()
     definitions: tuple[Definition, ...] = ()
 
 
 #: A body that does not turn.
-STILL = Swing(turns=sp.S.Zero, swing=sp.S.Zero, at_start=sp.S.Zero)
-
-#: The driven body.
-WITH_DRIVER = Swing(turns=sp.S.One, swing=sp.S.Zero, at_start=sp.S.Zero)
+STILL = Swing(turns=sp.S.Zero, rate=sp.S.Zero)
 
 
-def swing_of(pose: Pose, start: sp.Expr, positions: tuple[sp.Symbol, ...]) -> Swing:
-    """Angle of a body that a dyad has placed.
+def with_driver(drive: Drive) -> Swing:
+    """Of the driven body, or of what a shaft carries."""
+    return Swing(turns=sp.S.One, rate=drive.speed)
 
-    Parameters
-    ----------
-    start : the driver's angle at the start of a run [rad]
-    positions : the coordinates, zero in the ideal linkage
-    """
+
+def swing_of(linkage: Linkage, body: str) -> Swing:
+    """Angle of a body of a linkage, or of its frame."""
+    if body == linkage.driven:
+        return with_driver(linkage.drive)
+    pose, positions = linkage.pose(body), linkage.positions
     if sp.sympify(pose.cos).is_number:
         return STILL
-    body, mark = pose.body, subscript(pose.body)
+    mark, start = subscript(body), linkage.drive.first_angle
     turns, mean, swing, at_start = (
         sp.Symbol(f"body.{body}.{name}", real=True) for name in ("turns", "mean_angle", "swing", "swing_at_start")
     )
@@ -95,7 +99,13 @@ def swing_of(pose: Pose, start: sp.Expr, positions: tuple[sp.Symbol, ...]) -> Sw
     constants = (
         (turns, Turns(pose.cos, pose.sin, *positions), "1", f"Turns of the {body} in a turn of the driver", "N"),
         (mean, Mean(pose.cos, pose.sin, turns, *positions), "rad", f"Mean of the rest of the {body}'s angle", "m"),
-        (at_start, Ideal(swing, start, *positions), "rad", f"Swing of the {body} at the start, ideal", "s^0"),
+        (
+            at_start,
+            Ideal(swing, start, *positions),
+            "rad",
+            f"Swing of the {body} at the start, ideal",
+            "s^0",
+        ),
     )
     rest = mean + sp.atan2(pose.sin * cos - pose.cos * sin, pose.cos * cos + pose.sin * sin)
     words = f"Angle of the {body} less its whole turns with the driver"
@@ -103,6 +113,7 @@ def swing_of(pose: Pose, start: sp.Expr, positions: tuple[sp.Symbol, ...]) -> Sw
         turns=turns,
         swing=swing,
         at_start=at_start,
+        rate=pose.rate,
         constants=tuple(
             Definition(symbol=s, expression=e, unit=u, description=d, latex=rf"{letter}_{{{mark}}}")
             for s, e, u, d, letter in constants

@@ -131,7 +131,7 @@ class Defects(Effect):
             switches=tuple(switch for gate in found for switch in gate.switches),
         )
 
-    def constants(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> tuple[Definition, ...]:
+    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
         contacts = (one for spall in effect.parts for one in _contacts(spall, bearing, names))
         return tuple(d for one in contacts for d in one.constants())
 

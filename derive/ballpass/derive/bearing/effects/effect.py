@@ -90,7 +90,7 @@ class Effect(ABC):
         """Where it begins and ends for a ball: inputs, and definitions and switches where the motion decides."""
         return OverAngle(value=sp.S.Zero)
 
-    def constants(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> tuple[Definition, ...]:
+    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
         """Derived constants of its own."""
         return ()
 

@@ -5,7 +5,7 @@ A new pathway or law is a file here; an entry in `FORCE_TABLES` says in which ta
 
 from ballpass.derive.mechanism.forces.along_direction import AlongDirection
 from ballpass.derive.mechanism.forces.angle_table import AngleTable
-from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, drawn_forces, drawn_springs
+from ballpass.derive.mechanism.forces.applied import NO_FORCES, Forces, derive_forces, drawn_forces, drawn_springs
 from ballpass.derive.mechanism.forces.body_torque import BodyTorque
 from ballpass.derive.mechanism.forces.constant import ConstantForce
 from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
@@ -29,7 +29,7 @@ __all__ = [
     "Law",
     "Pathway",
 ]
-__all__ += ["PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_springs"]
+__all__ += ["NO_FORCES", "PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_springs"]
 
 #: In the order in which their numbers are listed; a force has the pathway and law whose key is given, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
@@ -36,11 +35,14 @@ class Forces:
     constants: tuple[Definition, ...] = ()
 
 
-def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
+NO_FORCES = Forces(loads=(), of_each=MappingProxyType({}), definitions=(), inputs=(), outputs=())
+
+
+def derive_forces(linkage: Linkage) -> Forces:
     """Derive the loads of all forces and torques of a mechanism."""
-    setting = Setting(mechanism=mechanism, linkage=linkage, drive=drive)
+    setting = Setting(mechanism=linkage.mechanism, linkage=linkage, drive=linkage.drive)
     loads: dict[str, tuple[AppliedLoad, ...]] = {}
-    for force in mechanism.forces:
+    for force in linkage.mechanism.forces:
         action = force.pathway.act(force, setting)
         loads[force.label] = action.loads(force.law.amount(force, action, setting))
     return Forces(
