@@ -13,6 +13,7 @@ from pathlib import Path
 from ballpass.derive.reading.json_schema import meaning
 from ballpass.derive.reading.sections import Section, sections
 from ballpass.derive.scene.keys import ChoiceKey, Key, QuantityKey, VectorKey, WholeKey
+from ballpass.derive.scene.read_keys import Either
 
 PAGE = Path(__file__).parent / "reference" / "scene.md"
 TABLE = re.compile(r"(<!-- (keys|usual)(.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -95,16 +96,25 @@ def needed(uses: Sequence[tuple[Section, Key]], tables: Sequence[Section]) -> st
 def need(section: Section, key: Key) -> str:
     """Whether it is needed."""
     name = next(name for name, other in section.keys.items() if other is key)
-    groups = section.either.groups if section.either is not None else ()
     text = key.when or ("optional" if key.optional else "required")
     if not key.when and key.default is not None:
         text = f"default {key.default}"
-    for group in groups:
-        if name in group:
-            beside = "".join(f" with `{other}`" for other in group if other != name)
-            others = (" and ".join(f"`{key}`" for key in other) for other in groups if other != group)
-            text = f"this{beside} or {' or '.join(others)}"
+    if not key.when and key.needs:
+        text = f"{text} with {' and '.join(f'`{one}`' for one in key.needs)}, else refused"
+    for rule in section.one_of:
+        for group in rule.groups:
+            if name in group and not key.when:
+                text = choice(name, group, rule)
     return text + ("; setting" if isinstance(key, QuantityKey) and key.setting else "")
+
+
+def choice(name: str, group: Sequence[str], rule: Either) -> str:
+    """When a key of a group is needed, of which one is given."""
+    others = [" and ".join(f"`{key}`" for key in one) for one in rule.groups if name not in one]
+    if rule.several:
+        return f"this, {', '.join(others)}, or both"
+    beside = "".join(f" with `{other}`" for other in group if other != name)
+    return f"this{beside} or {' or '.join(others)}" if others else f"optional,{beside}"
 
 
 def usual_rows(known: Sequence[Section]) -> str:

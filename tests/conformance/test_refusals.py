@@ -20,7 +20,7 @@ WRONG = [
     (SPRING, '"frame", "lever"', '"frame", "rod"', r"springs\.it\.bodies.*rod"),
     (SPRING, '"hook", "tip"', '"hook", "end"', r"springs\.it\.points.*end"),
     (SPRING, 'free_length = "150 mm"\n', "", r'springs\.it\.free_length.*add free_length = "40 mm"'),
-    (SPRING, 'stiffness = "2 N/mm"\n', "", r"springs\.it\.free_length.*delete it"),
+    (SPRING, 'stiffness = "2 N/mm"\n', "", r"springs\.it\.free_length.*delete the key"),
     (
         SPRING,
         'stiffness = "2 N/mm"\nfree_length = "150 mm"\ndamping = "40 N*s/m"\n',
@@ -46,7 +46,7 @@ WRONG = [
     (PIN, 'smoothing = "5 rad/s"\n', "", r'add smoothing = "1 rad/s"'),
     (PIN, '"5 rad/s"', '"0 rad/s"', "the value is zero"),
     (PIN, '"30 N*m"', '"-30 N*m"', "the value is negative"),
-    (PIN, 'viscous = "0.4 N*m*s/rad"\ntorque = "30 N*m"\nsmoothing = "5 rad/s"\n', "", "neither viscous friction nor"),
+    (PIN, 'viscous = "0.4 N*m*s/rad"\ntorque = "30 N*m"\nsmoothing = "5 rad/s"\n', "", "neither viscous nor torque"),
     (PIN, 'torque = "30 N*m"', "coefficient = 0.1", "that reaction depends on the friction itself"),
     (PIN, '"B"', '"Q"', "there is no such joint"),
     (PIN, '"B"', '"S"', r"this joint is prismatic.*\[mechanism.guide_friction.it\]"),

@@ -79,7 +79,7 @@ def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:
     required = [_required(section) for section in always]
     table["required"] = [name for name in (required[0] if required else ()) if all(name in one for one in required)]
     table["required"] += dict.fromkeys(section.variant[0] for section in own if section.variant[0])
-    table["allOf"] = [_rules(section) for section in always if section.either is not None]
+    table["allOf"] = [rule for section in always for rule in _rules(section)]
     table["allOf"] += [_of_variant(own, value) for value in dict.fromkeys(s.variant for s in own) if value[0]]
     table = {word: value for word, value in table.items() if value or word == "additionalProperties"}
     return {"anyOf": [table, {"type": "array", "items": table}]} if any(s.many for s in own) else table
@@ -87,18 +87,22 @@ def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:
 
 def _required(section: Section) -> list[str]:
     """Keys that are always needed."""
-    some = {key for group in section.either.groups for key in group} if section.either is not None else set()
-    needed = (name for name, key in section.keys.items() if not (key.optional or key.when or key.default is not None))
-    return [name for name in needed if name not in some and name not in _PATTERNS]
+    some = {key for rule in section.one_of for group in rule.groups for key in group}
+    return [
+        name
+        for name, key in section.keys.items()
+        if not (key.optional or key.when or key.needs or key.default is not None or name in some or name in _PATTERNS)
+    ]
 
 
-def _rules(section: Section) -> dict[str, Any]:
-    """Of the groups of keys one is given."""
-    either = section.either
-    if either is None:
-        return {}
-    given = [{"required": [*group]} for group in either.groups]
-    return {"oneOf": [*given, {"not": {"anyOf": given}}]} if either.optional else {"oneOf": given}
+def _rules(section: Section) -> list[dict[str, Any]]:
+    """Of the groups of keys one is given, or one at least."""
+    found = []
+    for rule in section.one_of:
+        given = [{"required": [*group]} for group in rule.groups]
+        none = [{"not": {"anyOf": [{"required": [key]} for group in rule.groups for key in group]}}] * rule.optional
+        found.append({"anyOf" if rule.several else "oneOf": [*given, *none]})
+    return found
 
 
 def _of_variant(own: Sequence[Section], variant: tuple[str, str]) -> dict[str, Any]:
@@ -107,5 +111,6 @@ def _of_variant(own: Sequence[Section], variant: tuple[str, str]) -> dict[str, A
     chosen = [section for section in own if section.variant == variant]
     kept = {key for section in chosen for key in section.keys}
     others = dict.fromkeys(key for section in own for key in section.keys if key not in kept)
-    then = {"required": _required(chosen[0]), "properties": dict.fromkeys(others, _UNKNOWN), **_rules(chosen[0])}
+    then = {"required": _required(chosen[0]), "properties": dict.fromkeys(others, _UNKNOWN), "allOf": _rules(chosen[0])}
+    then = {word: rules for word, rules in then.items() if rules or word != "allOf"}
     return {"if": {"properties": {tag: {"const": value}}, "required": [tag]}, "then": then}

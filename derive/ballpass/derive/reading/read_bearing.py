@@ -11,7 +11,7 @@ from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.elements import ELEMENTS, RollingElement
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_cage import read_cage
-from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body
+from ballpass.derive.reading.read_coupling import check_count, read_coupling, read_inner_body
 from ballpass.derive.reading.read_designation import fill_by_designation
 from ballpass.derive.reading.read_duty import read_alignment, read_lubrication
 from ballpass.derive.reading.read_fit import mounted
@@ -27,7 +27,7 @@ from ballpass.derive.scene.bearing_records import (
 )
 from ballpass.derive.scene.keys import ChoiceKey, PairKey
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import Either, keys_of, read_keys, read_record
+from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
@@ -83,11 +83,13 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
         element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
-        joint, share = _read_place(table, mechanism, driven, coupling)
+        joint, share, count = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
-        _refuse_angle(table, element)
-        numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
+        contact = table.data.get("contact")
+        stiff = isinstance(contact, dict) and "stiffness" in contact
+        facts = {"element": element.name, "contact": "stiffness" if stiff else "grooves"}
+        numbers = read_keys(table, {name: keys[name] for name in _NUMBERS}, choices_of(Bearing), facts)
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
         numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
         return Bearing(
@@ -96,7 +98,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             share=share,
             coupling=coupling,
             inner_body=inner_body,
-            count=read_count(table, coupling),
+            count=count,
             **numbers,
             contact=element.read_contact(table),
             damping=_read_damping(table, element),
@@ -114,35 +116,27 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 def _read_place(
     table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str
-) -> tuple[str | None, SceneNumber | None]:
+) -> tuple[str | None, SceneNumber | None, SceneNumber | None]:
+    """Joint of a bearing, its share of the reaction, and the number of bearings side by side."""
+    keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "count")}
     if mechanism is None:
-        table.refuse(
-            ("joint",),
-            "there is no mechanism to load the bearing",
-            allowed="joint only in a scene with [mechanism]",
-            remedy="delete the key, or describe the mechanism",
-        )
-        return None, keys_of(Bearing)["share"].read(table, "share") if table.has("share") else None
-    share = None
-    if coupling == "one-way":
-        share = keys_of(Bearing)["share"].read(table, "share")
+        keys["share"] = replace(keys["share"], optional=True)
     else:
-        table.refuse(
-            ("share",),
-            "a bearing coupled two-way takes the load that the motion gives it",
-            allowed="count, the number of bearings side by side",
-            remedy="write count = 2 instead of share = 0.5",
-        )
-    name = replace(keys_of(Bearing)["joint"], example=mechanism.driver.joint or "A").read(table, "joint")
+        keys["joint"] = replace(keys["joint"], example=mechanism.driver.joint or "A")
+    name, share, count = read_keys(table, keys, facts={"mechanism": mechanism, "coupling": coupling}).values()
+    check_count(table, count)
+    place = name, share, count
+    if mechanism is None:
+        return place
     if not name or not mechanism.joints:
-        return name, share
+        return place
     joint = next((joint for joint in mechanism.joints if joint.name == name), None)
     names, given = [joint.name for joint in mechanism.joints], show(name)
     if joint is None:
         problem, allowed = f"there is no joint {show(name)}", listing(names)
         remedy = suggest(name, names, "name the driver's joint")
     elif joint.kind is None or not joint.bodies:  # reported
-        return name, share
+        return place
     elif coupling == "two-way" and joint.kind != "revolute":
         problem, remedy = "the bearing must sit at a revolute joint", "name one of these joints"
         given, allowed = (
@@ -159,35 +153,9 @@ def _read_place(
             f'write joint = "{mechanism.driver.joint}", or coupling = "two-way"',
         )
     else:
-        return name, share
+        return place
     table.fault("joint", problem, given=given, allowed=allowed, remedy=remedy)
-    return name, share
-
-
-def _refuse_angle(table: Table, element: RollingElement) -> None:
-    """Rules across the keys of the contact angle."""
-    contact = table.data.get("contact")
-    if element.name != "ball":
-        table.refuse(
-            ("contact_angle", "axial_displacement"),
-            f"a bearing of the element {show(element.name)} has no contact angle",
-            allowed='a contact angle with element = "ball"',
-            remedy="delete the key",
-        )
-    if table.has("contact_angle"):
-        table.refuse(
-            ("axial_displacement",),
-            "the contact angle is given twice",
-            allowed="contact_angle or axial_displacement",
-            remedy="delete one of the two",
-        )
-    elif isinstance(contact, dict) and "stiffness" in contact:
-        table.refuse(
-            ("axial_displacement",),
-            "the contact angle follows from the radii of the grooves, and the scene gives a stiffness",
-            allowed="axial_displacement with inner_groove_radius and outer_groove_radius in the table contact",
-            remedy="write contact_angle instead",
-        )
+    return place
 
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:
@@ -242,19 +210,10 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
 
 def _read_outer_ring(table: Table) -> OuterRing | None:
     with table.table("outer_ring", 'support = "fixed"') as ring:
-        keys = keys_of(OuterRing)
-        ring.know("support", *keys)
+        ring.know("support")
         support = SUPPORT.read(ring, "support")
-        if support == "elastic":
-            return read_record(OuterRing, ring)
-        if support == "fixed":
-            ring.refuse(
-                keys,
-                "a fixed outer ring does not move",
-                allowed='nothing besides support = "fixed"',
-                remedy='delete the key, or write support = "elastic"',
-            )
-    return None
+        found = read_record(OuterRing, ring, facts={"support": support})
+    return found if support == "elastic" else None
 
 
 def _read_initial(table: Table, *, moving_outer: bool) -> InitialState:

@@ -62,16 +62,8 @@ def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way
     return "two-way" if coupling == "two-way" else "one-way"
 
 
-def read_count(table: Table, coupling: str) -> SceneNumber | None:
-    """How many bearings stand side by side in a joint with play."""
-    if coupling == "one-way":
-        table.refuse(
-            ("count",),
-            "a bearing that is loaded one-way carries a share of the reaction",
-            allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
-            remedy="write share = 0.5 for one of two bearings",
-        )
-    count: SceneNumber | None = keys_of(Bearing)["count"].read(table, "count")
+def check_count(table: Table, count: SceneNumber | None) -> None:
+    """Note a fault where so many bearings cannot stand side by side."""
     if count is not None and math.isfinite(count.value) and not count.value.is_integer():
         table.fault(
             "count",
@@ -80,7 +72,6 @@ def read_count(table: Table, coupling: str) -> SceneNumber | None:
             allowed="a whole number from 1",
             remedy="write count = 2 for a pair; bearings that differ have tables of their own",
         )
-    return count
 
 
 def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:

@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
-from ballpass.derive.scene.bearing_records import DIRT, Alignment, Lubrication
+from ballpass.derive.scene.bearing_records import Alignment, Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.read_keys import keys_of, read_record
+from ballpass.derive.scene.read_keys import read_record
 from ballpass.derive.scene.records import DutyState, Scene
 from ballpass.derive.scene.table import Table, listing
 from ballpass.derive.scene.units import show
@@ -92,11 +92,7 @@ def read_alignment(table: Table) -> Alignment | None:
     if not table.has("alignment"):
         return None
     with table.table("alignment", "misalignment, or span and shaft_diameter") as said:
-        found = read_record(Alignment, said)
-        for key, other in (("span", "shaft_diameter"), ("shaft_diameter", "span")):
-            if said.has(key) and not said.has(other):
-                said.take(other, keys_of(Alignment)[other].sample)
-        return found
+        return read_record(Alignment, said)
 
 
 def read_lubrication(table: Table) -> Lubrication | None:
@@ -104,14 +100,8 @@ def read_lubrication(table: Table) -> Lubrication | None:
     if not table.has("lubrication"):
         return None
     with table.table("lubrication") as film:
-        DIRT.choose(film, keys_of(Lubrication))
         found = read_record(Lubrication, film)
-        if found.oil_code is None:
-            remedy = "delete the key, or give oil_code instead of the contamination"
-            film.refuse(
-                ("filter",), "a filter belongs to the code of an oil", allowed="filter with oil_code", remedy=remedy
-            )
-        elif found.oil_code not in FILTERS[found.filter or "off line"]:
+        if found.oil_code is not None and found.oil_code not in FILTERS[found.filter or "off line"]:
             film.fault(
                 "oil_code",
                 "ISO 281 has no contamination factor for this code with a filter in line",

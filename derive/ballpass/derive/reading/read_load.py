@@ -55,5 +55,5 @@ def _read_window(table: Table, key: str) -> LoadWindow | None:
     if not table.has(key):
         return None
     with table.table(key, "start and end") as window:
-        endless = key == "time_window" and not window.has("end")
-        return read_record(LoadWindow, window, WINDOWS[key], **({"end": None} if endless else {}))
+        known: dict[str, Any] = {"end": None} if key == "time_window" and not window.has("end") else {}
+        return read_record(LoadWindow, window, WINDOWS[key], **known)

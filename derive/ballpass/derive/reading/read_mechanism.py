@@ -168,14 +168,10 @@ def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[
 
 def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
     data.know(*keys_of(Joint), "branch")
-    is_guide, fill = data.data.get("type") == "prismatic", {"NAME": name, "INDEX": upright(name)}
-    branch = BRANCH.read(data, "branch")
-    joint = read_record(Joint, data, fill, name=name, branch=branch, **({} if is_guide else {"direction": None}))
+    fill, branch = {"NAME": name, "INDEX": upright(name)}, BRANCH.read(data, "branch")
+    joint = read_record(Joint, data, fill, name=name, branch=branch)
     good = check_two_bodies(data, joint.bodies, points, "a joint of a body with itself") and joint.kind is not None
     refuse_unknown_points(data, joint, points)
-    if joint.kind == "revolute":
-        remedy = 'delete the key, or write type = "prismatic"'
-        data.refuse(("direction",), "a revolute joint has no direction", remedy=remedy)
     return joint, good
 
 

@@ -21,7 +21,7 @@ from ballpass.derive.reading.read_designation import DESIGNATION
 from ballpass.derive.reading.read_fit import Fit
 from ballpass.derive.scene import bearing_records, records
 from ballpass.derive.scene.keys import Fill, Key
-from ballpass.derive.scene.read_keys import Either, keys_of
+from ballpass.derive.scene.read_keys import Either, choices_of, keys_of
 
 #: Text in place of a name in descriptions.
 NAME: Fill = {"NAME": "<name>", "POINT": "<name>", "OWNER": "body or frame", "INDEX": ""}
@@ -35,7 +35,7 @@ class Section:
     ----------
     path : parts of its place; "*" stands for a name that the user chooses, "#" for a number
     keys : by name
-    either : groups of keys of which one is given
+    one_of : groups of keys of which one is given
     variant : key, and the value of it that the section holds for; empty where it always does
     many : it may be a list of such tables
     free : it may have any keys
@@ -43,7 +43,7 @@ class Section:
 
     path: tuple[str, ...]
     keys: Mapping[str, Key]
-    either: Either | None = None
+    one_of: tuple[Either, ...] = ()
     variant: tuple[str, str] = ("", "")
     many: bool = False
     free: bool = False
@@ -57,15 +57,15 @@ def sections() -> tuple[Section, ...]:
 def _of(path: str, *kinds: type[Any], fill: Fill = NAME, **more: Any) -> Section:
     """The keys of records, and others."""
     keys = {name: key for kind in kinds for name, key in keys_of(kind, fill).items()}
-    either = next((kind.either for kind in kinds if hasattr(kind, "either")), None)
-    return Section(path=tuple(path.split(".")) if path else (), keys=keys | more, either=either)
+    one_of = tuple(rule for kind in kinds for rule in choices_of(kind, fill))
+    return Section(path=tuple(path.split(".")) if path else (), keys=keys | more, one_of=one_of)
 
 
 def _variants(
-    path: str, tag: Key, name: str, kinds: Mapping[str, tuple[Mapping[str, Key], Either | None]]
+    path: str, tag: Key, name: str, kinds: Mapping[str, tuple[Mapping[str, Key], tuple[Either, ...]]]
 ) -> Iterator[Section]:
-    for value, (keys, either) in kinds.items():
-        yield Section(path=tuple(path.split(".")), keys={name: tag, **keys}, either=either, variant=(name, value))
+    for value, (keys, one_of) in kinds.items():
+        yield Section(path=tuple(path.split(".")), keys={name: tag, **keys}, one_of=one_of, variant=(name, value))
 
 
 def _top() -> Iterator[Section]:
@@ -81,7 +81,7 @@ def _mechanism() -> Iterator[Section]:
     yield _of("mechanism.driver", records.Driver, fill=read_mechanism.CONSTANT)
     yield _of("mechanism.driver.table", records.SpeedOverTime)
     yield _of("mechanism.driver.flywheel", inertia=read_mechanism.FLYWHEEL)
-    torques = {name: (keys_of(law), getattr(law, "either", None)) for name, law in TORQUE_LAWS.items()}
+    torques = {name: (keys_of(law), choices_of(law)) for name, law in TORQUE_LAWS.items()}
     yield from _variants("mechanism.driver.torque", read_mechanism.LAW, "law", torques)
     points = {"*": records.POINT.filled(NAME)}
     yield Section(path=("mechanism", "frame", "points"), keys=points)
@@ -100,16 +100,17 @@ def _forces(table: ForceTable) -> Iterator[Section]:
             left_out = keys_of(pathway).keys() & pathway.left_out(law).keys()
             inner = law.inner()
             keys = keys_of(pathway, fill) | (keys_of(law, fill) if inner is None else {})
-            yield Section(path=tuple(path.split(".")), keys={k: v for k, v in keys.items() if k not in left_out})
+            keys = {name: key for name, key in keys.items() if name not in left_out}
+            yield Section(path=tuple(path.split(".")), keys=keys, one_of=choices_of(law, fill))
             if inner is not None:
                 yield Section(path=(*path.split("."), law.key), keys=keys_of(inner, fill), many=inner is not law)
 
 
 def _load() -> Iterator[Section]:
-    loads = {name: (keys_of(law), getattr(law, "either", None)) for name, law in read_load.LOADS.items()}
+    loads = {name: (keys_of(law), choices_of(law)) for name, law in read_load.LOADS.items()}
     yield from _variants("load", read_load.TYPE, "type", loads)
     both = {"phase": read_load.components_of_phase()}
-    yield from _variants("load", read_load.TYPE, "type", {"harmonic": (both, None)})
+    yield from _variants("load", read_load.TYPE, "type", {"harmonic": (both, ())})
     for key, fill in read_load.WINDOWS.items():
         yield _of(f"load.{key}", records.LoadWindow, fill=fill)
 
@@ -130,7 +131,7 @@ def _bearing() -> Iterator[Section]:
         yield _of("bearing.contact", element.given)
         yield _of("bearing.contact.ball_material", bearing_records.Material, fill=element.element_material)
     smoothing = keys_of(bearing_records.Damping)
-    laws = {name: ({**law.keys, **(smoothing if law.kinked_at_rest else {})}, law.either) for name, law in LAWS.items()}
+    laws = {name: ({**law.keys, **(smoothing if law.kinked_at_rest else {})}, law.one_of) for name, law in LAWS.items()}
     yield from _variants("bearing.damping", read_bearing.LAW, "law", laws)
     yield _of("bearing.inner_ring", bearing_records.InnerRing, body=read_coupling.BODY)
     yield _of("bearing.inner_ring.equivalent_mass", bearing_records.EquivalentMass)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.designations import GROUPS
-from ballpass.derive.scene.keys import ChoiceKey, TextKey, WholeKey
+from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, declared, not_negative, positive, quantity
 from ballpass.runtime.ratings.life import CONTAMINATION
@@ -186,6 +186,9 @@ class InnerRing:
     )
 
 
+_MOVING = (Needs(key="support", value="elastic", why="a fixed outer ring does not move"),)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OuterRing:
     """Outer ring on an elastic housing: mass [kg], stiffness [N/m], damping [N*s/m]."""
@@ -195,14 +198,14 @@ class OuterRing:
         "Mass of the outer ring and what moves with it",
         "m_o",
         "0.5 kg",
-        when="required if elastic",
+        needs=_MOVING,
         remedy='give the moved mass, or write support = "fixed"',
     )
     stiffness: SceneNumber = not_negative(
-        "N/m", "Stiffness between outer ring and frame", "k_p", "50 N/um", when="required if elastic"
+        "N/m", "Stiffness between outer ring and frame", "k_p", "50 N/um", needs=_MOVING
     )
     damping: SceneNumber = not_negative(
-        "N*s/m", "Damping between outer ring and frame", "c_p", "500 N*s/m", when="required if elastic"
+        "N*s/m", "Damping between outer ring and frame", "c_p", "500 N*s/m", needs=_MOVING
     )
 
 
@@ -249,12 +252,12 @@ class Lubrication:
     """Lubricant film and contamination, for the life factor of ISO 281; the derived equations do not depend on it.
 
     Of `viscosity_ratio` [1], kinematic `viscosity` at the bearing's temperature [m^2/s], and grade of the oil with
-    temperature [°C] one is given, and of `contamination`, e_C [1], a class of `cleanliness`, and the code of the oil
-    one, see `DIRT`.
+    temperature [°C] one is given, and of `contamination`, e_C [1], a class of `cleanliness`, and the code of the oil.
     """
 
-    either: ClassVar[Either] = Either(
-        what="the film", groups=(("viscosity_ratio",), ("viscosity",), ("oil_grade", "temperature_celsius"))
+    one_of: ClassVar[tuple[Either, ...]] = (
+        Either(what="the film", groups=(("viscosity_ratio",), ("viscosity",), ("oil_grade", "temperature_celsius"))),
+        Either(what="the contamination", groups=(("contamination",), ("cleanliness",), ("oil_code",))),
     )
 
     viscosity_ratio: float | None = quantity(
@@ -290,8 +293,6 @@ class Lubrication:
         "Contamination factor $e_C$ of ISO 281",
         example=0.5,
         setting=True,
-        optional=True,
-        when="this, `cleanliness` or `oil_code`",
         bounds=Bounds(least=0.0, most=1.0),
         remedy="write contamination = 0.5 where cleanliness is normal",
         note="1 is clean; classes in {doc}`../theory/life`",
@@ -300,8 +301,6 @@ class Lubrication:
         ChoiceKey(
             words="Class of cleanliness of ISO 281",
             choices=tuple(CONTAMINATION),
-            optional=True,
-            when="instead of `contamination`",
             note="$e_C$ is the lower end of its range",
         )
     )
@@ -309,8 +308,6 @@ class Lubrication:
         ChoiceKey(
             words="Cleanliness code of a circulating oil or a bath, ISO 4406",
             choices=tuple(FILTERS["off line"]),
-            optional=True,
-            when="instead of `contamination`",
             note="$e_C$ follows with `filter`, κ and pitch diameter",
         )
     )
@@ -319,7 +316,14 @@ class Lubrication:
             words="Where the oil is filtered",
             choices=tuple(FILTERS),
             optional=True,
-            when='with `oil_code`; default `"off line"`, also for a bath',
+            needs=(
+                Needs(
+                    key="oil_code",
+                    why="a filter belongs to the code of an oil",
+                    remedy="delete the key, or give oil_code instead of the contamination",
+                ),
+            ),
+            note='default `"off line"`, also for a bath',
         )
     )
 
@@ -327,6 +331,8 @@ class Lubrication:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alignment:
     """Tilt of the rings by misalignment [rad] and bending of the shaft [m], for a hand formula beside the life."""
+
+    one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("span", "shaft_diameter"),), optional=True),)
 
     misalignment: float | None = not_negative(
         "rad",
@@ -340,21 +346,16 @@ class Alignment:
         "Distance of the two bearings of the shaft, its load in the middle",
         example="200 mm",
         setting=True,
-        optional=True,
-        when="with `shaft_diameter`",
     )
     shaft_diameter: float | None = positive(
         "m",
         "Diameter of the shaft, round and of steel",
         example="20 mm",
         setting=True,
-        optional=True,
-        when="with `span`",
     )
 
 
-#: How dirty the lubricant is: one of these.
-DIRT = Either(what="the contamination", groups=(("contamination",), ("cleanliness",), ("oil_code",)))
+_ONLY_BALLS = (Needs(key="element", value="ball", why="a bearing of such elements has no contact angle"),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -372,12 +373,28 @@ class Bearing:
     scene says nothing of that kind.
     """
 
+    one_of: ClassVar[tuple[Either, ...]] = (
+        Either(
+            what="the contact angle",
+            groups=(("contact_angle",), ("axial_displacement",)),
+            at="axial_displacement",
+            optional=True,
+        ),
+    )
+
     name: str
     joint: str | None = declared(
         TextKey(
             words="The joint that the bearing is at",
             example="A",
-            when="required with a mechanism, else refused",
+            needs=(
+                Needs(
+                    key="mechanism",
+                    why="there is no mechanism to load the bearing",
+                    words="[mechanism]",
+                    remedy="delete the key, or describe the mechanism",
+                ),
+            ),
             note="one-way: the driver's joint; two-way: any revolute joint",
         )
     )
@@ -387,6 +404,14 @@ class Bearing:
         "s",
         0.5,
         when="one-way: required with a mechanism; two-way: refused; on a shaft, of its load: all without it",
+        needs=(
+            Needs(
+                key="coupling",
+                value="one-way",
+                why="a bearing coupled two-way takes the load that the motion gives it",
+                remedy="write count = 2 instead of share = 0.5",
+            ),
+        ),
         bounds=Bounds(least=0.0, most=1.0),
         remedy="give the part of the load that this bearing carries: 0.5 for one of a pair",
     )
@@ -408,6 +433,14 @@ class Bearing:
         2,
         optional=True,
         when="two-way: default 1, else refused",
+        needs=(
+            Needs(
+                key="coupling",
+                value="two-way",
+                why="a bearing that is loaded one-way carries a share of the reaction",
+                remedy="write share = 0.5 for one of two bearings",
+            ),
+        ),
         note="a whole number; those that differ have tables of their own",
     )
     balls: int = declared(
@@ -441,6 +474,7 @@ class Bearing:
         "8 deg",
         optional=True,
         when="default: none, contact in the radial plane",
+        needs=_ONLY_BALLS,
         bounds=Bounds(least=0.0, below=math.pi / 2),
         remedy="give an angle from 0 deg to below 90 deg",
         usual=UsualRange(most=math.radians(50), hint="Angular contact bearings have up to 45 deg: check the unit."),
@@ -454,6 +488,16 @@ class Bearing:
         "40 um",
         optional=True,
         when="instead of `contact_angle`",
+        needs=(
+            *_ONLY_BALLS,
+            Needs(
+                key="contact",
+                value="grooves",
+                why="the contact angle follows from the radii of the grooves, and the scene gives a stiffness",
+                words="inner_groove_radius and outer_groove_radius in the table contact",
+                remedy="write contact_angle instead",
+            ),
+        ),
         usual=UsualRange(most=0.03, of="ball_diameter", hint="Preload moves rings by some hundredths: check the unit."),
         note="the contact angle follows with `clearance` and grooves; not with a given `stiffness`",
     )

@@ -2,7 +2,7 @@
 
 A declaration holds a description of the key, and for a number its unit, symbol, bounds and plausible range.  The
 reader, the checks of values, the warnings of unusual numbers, the reference page and the JSON Schema take it from
-there.  Only rules across keys are code.
+there.  A key says which others it needs (`Needs`), a record of which keys one is given (`Either`).
 
 Text of a declaration may hold placeholders in capitals ("Mass of the NAME"), which the owner of a table fills in.
 """
@@ -47,6 +47,42 @@ def filled(text: str, fill: Fill) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What a scene must say where a key belongs to its table.
+
+    Attributes
+    ----------
+    key, value : another key, and the value it has; any where empty.  Keys of other tables are given by their reader
+    why : problem of the key without it
+    words : what is needed, where key and value do not say it to people
+    remedy : what to do, besides deleting the key
+    """
+
+    key: str
+    value: str = ""
+    why: str
+    words: str = ""
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return self.words or (f'{self.key} = "{self.value}"' if self.value else self.key)
+
+    def met(self, table: Table, name: str, known: Mapping[str, Any]) -> bool:
+        """Whether a scene says it; a fault where it does not, and the key is given.
+
+        A value that is unknown has been reported, as have the keys of a table in which others are missing.
+        """
+        found = known.get(self.key)
+        if found == self.value or (not self.value and found is not None):
+            return True
+        if table.missing or (self.value and found is None):
+            return False
+        remedy = self.remedy or f"delete the key, or write {self}"
+        table.refuse((name,), self.why, allowed=f"{name} only with {self}", remedy=remedy)
+        return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Key(ABC):
     """One key of a table.
 
@@ -57,7 +93,8 @@ class Key(ABC):
     example : as the file has it; a text without its quotes
     default : value of a key that is not given, in the same form
     optional : it may be left out, and is None then
-    when : text on when it is needed, where other keys decide this: "required if elastic"
+    when : text on when it is needed, where other keys decide this, and not by `needs` or an `Either`
+    needs : it is read only where these are met, and is None elsewhere
     note : more for the reference page, in Markdown
     """
 
@@ -67,6 +104,7 @@ class Key(ABC):
     default: Any = None
     optional: bool = False
     when: str = ""
+    needs: tuple[Needs, ...] = ()
     note: str = ""
 
     quoted: ClassVar[bool] = True
@@ -76,6 +114,7 @@ class Key(ABC):
         values = {f.name: getattr(self, f.name) for f in fields(self)} if fill else {}
         texts: dict[str, Any] = {name: filled(v, fill) for name, v in values.items() if isinstance(v, str)}
         texts |= {name: tuple(filled(t, fill) for t in v) for name, v in values.items() if _texts(v)}
+        texts |= {"needs": tuple(replace(one, key=filled(one.key, fill)) for one in self.needs)} if self.needs else {}
         return replace(self, **texts) if texts else self
 
     @property

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.keys import ChoiceKey, NamesKey, TextKey, VectorKey, WholeKey
+from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
@@ -138,7 +138,7 @@ class Joint:
         "Direction of the guide of joint NAME",
         r"\psi_{INDEX}",
         "270 deg",
-        when="required for prismatic, else refused",
+        needs=(Needs(key="type", value="prismatic", why="a revolute joint has no direction"),),
         note="in the axes of the first body. The guide belongs to the first body and passes through its point; the "
         "second body's point moves along it without rotation against the first body",
     )
@@ -300,7 +300,9 @@ class TableLoad:
     least two.
     """
 
-    either: ClassVar[Either] = Either(what="what the rows are over", groups=(("time",), ("angle",)), at="angle")
+    one_of: ClassVar[tuple[Either, ...]] = (
+        Either(what="what the rows are over", groups=(("time",), ("angle",)), at="angle"),
+    )
 
     time: tuple[SceneNumber, ...] = column(
         "s",
@@ -391,7 +393,9 @@ class RunSettings:
     It is not `stated` where the file gives no turns at all: which are transient is then found.
     """
 
-    either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)), optional=True)
+    one_of: ClassVar[tuple[Either, ...]] = (
+        Either(what="the length of the run", groups=(("cycles",), ("duration",)), optional=True),
+    )
 
     cycles: float | None = positive("1", "Turns of driver or shaft", example=4, setting=True)
     duration: float | None = positive("s", "Duration of the run", example="0.5 s", setting=True)

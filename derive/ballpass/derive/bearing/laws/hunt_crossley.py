@@ -50,7 +50,7 @@ class HuntCrossley(DampingLaw):
             ),
         }
     )
-    either = Either(what="the damping factor", groups=(("hysteresis",), ("restitution", "impact_speed")))
+    one_of = (Either(what="the damping factor", groups=(("hysteresis",), ("restitution", "impact_speed"))),)
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         if "hysteresis" in numbers:

@@ -31,7 +31,7 @@ class DampingLaw(ABC):
     description : one clause for people
     unit, latex, words : of the law's coefficient, a constant of a run made of its numbers
     kinked_at_rest : whether its force has a kink where the rate passes zero, which a scene may smooth
-    keys, either : of its numbers in ``[bearing.damping]``; LAW stands for its name
+    keys, one_of : of its numbers in ``[bearing.damping]``; LAW stands for its name
     """
 
     name: ClassVar[str]
@@ -41,7 +41,7 @@ class DampingLaw(ABC):
     words: ClassVar[str] = "Damping coefficient of a ball, Eq. (10)"
     kinked_at_rest: ClassVar[bool] = False
     keys: ClassVar[Mapping[str, QuantityKey]] = MappingProxyType({})
-    either: ClassVar[Either | None] = None
+    one_of: ClassVar[tuple[Either, ...]] = ()
 
     def read(self, table: Table, fill: Fill) -> tuple[SceneNumber, ...]:
         """The law's numbers out of ``[bearing.damping]``; faults are noted.
@@ -51,7 +51,7 @@ class DampingLaw(ABC):
         fill : texts that the rolling element puts for others, see `RollingElement.fill`
         """
         keys = {name: key.filled({"LAW": self.name, **fill}) for name, key in self.keys.items()}
-        return tuple(number for number in read_keys(table, keys, self.either).values() if number is not None)
+        return tuple(number for number in read_keys(table, keys, self.one_of).values() if number is not None)
 
     @abstractmethod
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
@@ -83,7 +83,7 @@ class ViscousLaw(DampingLaw):
             ),
         }
     )
-    either = Either(what="the coefficient", groups=(("coefficient",), ("ratio",)))
+    one_of = (Either(what="the coefficient", groups=(("coefficient",), ("ratio",))),)
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return numbers["coefficient"] if "coefficient" in numbers else numbers["ratio"] * stiffness

@@ -20,8 +20,8 @@ class LinearCharacteristic(TorqueLaw):
 
     name: ClassVar[str] = "linear"
 
-    either: ClassVar[Either] = Either(
-        what="the torque", groups=(("stall_torque",), ("nominal_torque", "nominal_speed"))
+    one_of: ClassVar[tuple[Either, ...]] = (
+        Either(what="the torque", groups=(("stall_torque",), ("nominal_torque", "nominal_speed"))),
     )
 
     no_load_speed: SceneNumber = quantity("rad/s", "No-load speed of the motor", r"\omega_0", "1500 rpm")
@@ -35,7 +35,7 @@ class LinearCharacteristic(TorqueLaw):
     def amount(self) -> SceneNumber:
         """The torque at rest, or the nominal one."""
         amount = self.stall_torque or self.nominal_torque
-        assert amount is not None  # `either`
+        assert amount is not None  # `one_of`
         return amount
 
     def torque(self, speed: sp.Expr) -> sp.Expr:

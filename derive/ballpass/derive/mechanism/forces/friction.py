@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.keys import Fill, Needs
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import keys_of, not_negative, positive, read_record
+from ballpass.derive.scene.read_keys import Either, keys_of, not_negative, positive, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
@@ -27,13 +27,13 @@ class Friction(Law):
     At a revolute joint in [N*m*s/rad], [N*m] and [rad/s], at a guide in [N*s/m], [N] and [m/s].
     """
 
+    one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("viscous",), ("AMOUNT",)), several=True),)
+
     viscous: SceneNumber | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
         "Viscous friction of NAME",
         "c_{INDEX}",
         "0.1 AMOUNT_UNIT*s/SIZE_UNIT",
-        optional=True,
-        when="this, `AMOUNT`, or both",
     )
     coulomb: SceneNumber | None = not_negative(
         "AMOUNT_UNIT",
@@ -41,35 +41,22 @@ class Friction(Law):
         "F_{c,INDEX}",
         "2 AMOUNT_UNIT",
         name="AMOUNT",
-        optional=True,
-        when="this, `viscous`, or both",
     )
     smoothing: SceneNumber | None = positive(
         "SIZE_UNIT/s",
         "Rate over which the Coulomb friction of NAME turns round",
         r"\epsilon_{INDEX}",
         "EXAMPLE",
-        when="required with `AMOUNT`, else refused",
+        needs=(Needs(key="AMOUNT", why="only Coulomb friction turns round"),),
         remedy="give a small rate: below it friction grows, above it friction is full",
     )
 
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
         """Viscous, or torque (force) with smoothing, or both."""
-        keys, amount = keys_of(cls, fill), fill["AMOUNT"]
-        data.correct(keys)
-        refused = _refuse_coefficient(data, amount)
-        found = read_record(cls, data, fill, **({} if amount in data.data else {"smoothing": None}))
-        if not refused and not data.missing and found.viscous is None and found.coulomb is None:
-            data.fault(
-                "",
-                f"neither viscous friction nor a {amount}",
-                allowed=f"viscous, {amount} with smoothing, or both",
-                remedy=f"add viscous, or {amount} and smoothing",
-            )
-        if found.viscous is None and found.coulomb is None:
-            data.know(*keys)  # they belong to one of both
-        return found
+        data.correct(keys_of(cls, fill))
+        data.missing = data.missing or _refuse_coefficient(data, fill["AMOUNT"])
+        return read_record(cls, data, fill)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The friction under a name of its own."""

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.keys import Needs
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, read_record
+from ballpass.derive.scene.read_keys import Either, not_negative, quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
+
+_STIFF = (Needs(key="stiffness", why="it belongs to a stiffness"),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,13 +27,13 @@ class SpringDamper(Law):
     bodies in [N*m], [N*m/rad], [N*m/rad^3], [N*m*s/rad] and [rad].
     """
 
+    one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("stiffness",), ("damping",)), several=True),)
+
     stiffness: SceneNumber | None = not_negative(
         "AMOUNT_UNIT/SIZE_UNIT",
         "Stiffness of NAME",
         "k_{INDEX}",
         "1e4 AMOUNT_UNIT/SIZE_UNIT",
-        optional=True,
-        when="this, `damping`, or both",
     )
     free: SceneNumber | None = quantity(
         "SIZE_UNIT",
@@ -40,7 +41,7 @@ class SpringDamper(Law):
         "L_{0,INDEX}",
         "EXAMPLE",
         name="free_SIZE",
-        when="required with `stiffness`, else refused",
+        needs=_STIFF,
     )
     cubic_stiffness: SceneNumber | None = quantity(
         "AMOUNT_UNIT/SIZE_UNIT^3",
@@ -48,7 +49,7 @@ class SpringDamper(Law):
         "k_{3,INDEX}",
         "1e6 AMOUNT_UNIT/SIZE_UNIT^3",
         optional=True,
-        when="optional with `stiffness`, else refused",
+        needs=_STIFF,
         note="times the third power of what is beyond the free size; a negative one softens",
     )
     damping: SceneNumber | None = not_negative(
@@ -56,28 +57,10 @@ class SpringDamper(Law):
         "Damping of NAME",
         "c_{INDEX}",
         "10 AMOUNT_UNIT*s/SIZE_UNIT",
-        optional=True,
-        when="this, `stiffness`, or both",
     )
     preload: SceneNumber | None = quantity(
         "AMOUNT_UNIT", "THE_AMOUNT of NAME at its free SIZE", "F_{0,INDEX}", "5 AMOUNT_UNIT", optional=True
     )
-
-    @classmethod
-    def read(cls, data: Table, fill: Fill) -> Self:
-        """Stiffness with free length or angle, damping, or both; optionally a preload."""
-        keys, free = keys_of(cls, fill), f"free_{fill['SIZE']}"
-        data.correct(keys)
-        if not data.missing and "stiffness" not in data.data and "damping" not in data.data:
-            data.fault(
-                "",
-                "neither stiffness nor damping",
-                allowed=f"stiffness with {free}, damping, or both",
-                remedy=f"add stiffness and {free}, or damping",
-            )
-            data.know(*keys)  # they belong to one of both
-        left_out = {} if "stiffness" in data.data else {"free": None, "cubic_stiffness": None}
-        return read_record(cls, data, fill, **left_out)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The tension or torque under a name of its own."""
