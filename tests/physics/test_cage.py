@@ -131,3 +131,17 @@ def test_rows_that_do_not_begin_at_the_start_are_refused(scene_text: Callable[..
     table = '[bearing.cage]\nslip = { time = ["1 s", "2 s"], value = [0.0, 0.1] }\n[bearing.inner_ring]'
     with pytest.raises(SceneError, match="does not begin at the start"):
         scene_from_text(scene_text("varying_compliance", ("[bearing.inner_ring]", table)), "late")
+
+
+def test_a_ring_that_stands_is_passed_at_the_mean_speed_of_a_cage_that_slips(make_virtual: Callable[..., Model]) -> None:
+    """Of a shaft that carries the outer ring the balls passed the inner one as with the last slip."""
+    slip = '[bearing.cage]\nslip = { time = ["0 s", "0.03 s"], value = [0.0, 0.2] }\n[bearing.inner_ring]'
+    outer = ("[shaft]\n", '[shaft]\nring = "outer"\n')
+    model = make_virtual("varying_compliance", ("[bearing.inner_ring]", slip), outer)
+    values = {**model.parameters, **model.constants()}
+    found = {**values, **timeline.mean_rates(model.manifest, values, 0.02, 0.06)}
+    shaft = values["shaft.speed"]
+    cage = (1.0 - values["bearing.cage_ratio"]) * shaft * (1.0 - 0.2 * 0.03 / 0.04)
+    assert found["bearing.cage_speed"] == pytest.approx(cage, rel=1e-12)
+    assert found["bearing.inner_pass_speed"] == pytest.approx(cage, rel=1e-12)
+    assert found["bearing.outer_pass_speed"] == pytest.approx(cage - shaft, rel=1e-12)

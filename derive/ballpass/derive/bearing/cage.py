@@ -240,11 +240,10 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
         return angles[-1].angle + swung
 
     angle = ball("cage", turns, swung)
-    seen = {"outer": angle, "inner": angle}
+    seen = {"outer": angle}
     for ring, turning, its in (("outer", outer, share), ("inner", inner, share - 1)):
-        if turning is not STILL:
+        if ring == "inner" or turning is not STILL:  # an outer ring that stands sees the angle itself
             seen[ring] = ball(f"{ring}_pass", its * around, its * apart)
-        if turning is not STILL or ring == "inner":
             constants.append(_pass(names, ring, speed - turning.turns * drive.first_speed))
     ring_rate: sp.Symbol | None = None
     if (bearing.effects or lag is not None) and not steady:
@@ -265,7 +264,7 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
         outer=(seen["outer"], share_now * moving),
         inner=(seen["inner"], (share_now - 1) * moving),
         spin=None if spin is None else (spin, rolls * share_now * moving),
-        turnings={"outer": turnings["cage"], "inner": turnings["cage"]} | turnings if evenly else None,
+        turnings={"outer": turnings["cage"]} | turnings if evenly else None,
     )
     met = [EFFECTS[e.kind].edges(e, bearing, names, passes) for e in bearing.effects]
     constants += [c for one in angles for c in one.constants]
