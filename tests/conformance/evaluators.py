@@ -119,7 +119,7 @@ class Evaluators:
         totals: dict[sp.Symbol, sp.Expr] = {}
         for bearing in system.bearings:
             ball = bearing.ball
-            cage = _evaluated(ball.cage_angle, known)
+            cage = _evaluated(ball.cage.angle, known)
             for j in range(ball.count):
                 theta = cage + 2 * sp.pi * j / ball.count
                 one = known | {ball.cos: sp.cos(theta).evalf(DIGITS), ball.sin: sp.sin(theta).evalf(DIGITS)}

@@ -134,7 +134,7 @@ class Derived:
         results = [
             lowering._rhs(balls) if system.coordinates else ca.SX(0, 1),
             ca.vertcat(*outputs.values()),
-            ca.vertcat(*(visit(b.ball.cage_angle) for b in system.bearings)),
+            ca.vertcat(*(visit(b.ball.cage.angle) for b in system.bearings)),
             ca.vertcat(*(visit(e) for p in system.linkage.points for e in (p.x, p.y))),
             lowering._moving(visit, balls)(system.reactions.drive_torque),
         ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.elements import ELEMENTS
@@ -159,81 +160,44 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
 
 
 def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
-    of = f" of {bearing.name}" if bearing.name else ""
-    element = ELEMENTS[bearing.element]
-    yield Feature(
-        name=f"{element.noun} contacts{of}",
-        path=f"{bearing.path}.contact",
-        modelled=f"{bearing.balls} {element.noun}s at the cage's angles, {element.force_words} of each",
-        without=None,
-    )
+    of, element = f" of {bearing.name}" if bearing.name else "", ELEMENTS[bearing.element]
+
+    def feature(name: str, key: str, modelled: str, without: Scene | None = None, **other: Any) -> Feature:
+        """Without it some fields of the bearing are `other` ones."""
+        rest = without if not other else _with(scene, replace(bearing, **other))
+        return Feature(name=f"{name}{of}", path=f"{bearing.path}.{key}", modelled=modelled, without=rest)
+
+    words = f"{bearing.balls} {element.noun}s at the cage's angles, {element.force_words} of each"
+    yield feature(f"{element.noun} contacts", "contact", words)
     if bearing.coupling == "two-way":
-        yield Feature(
-            name=f"coupling{of}",
-            path=f"{bearing.path}.coupling",
-            modelled=f"play of joint {bearing.joint} moves the linkage, "
-            f"forces of the {element.noun}s act on both bodies",
-            without=_one_way(scene, bearing),
-        )
+        words = f"play of joint {bearing.joint} moves the linkage, forces of the {element.noun}s act on both bodies"
+        yield feature("coupling", "coupling", words, _one_way(scene, bearing))
     if bearing.contact.smoothing is not None:
-        sharp = replace(bearing, contact=replace(bearing.contact, smoothing=None))
-        yield Feature(
-            name=f"contact smoothing{of}",
-            path=f"{bearing.path}.contact.smoothing",
-            modelled="contact onset smoothed over a given width: second derivatives exist",
-            without=_with(scene, sharp),
-        )
+        words = "contact onset smoothed over a given width: second derivatives exist"
+        sharp = replace(bearing.contact, smoothing=None)
+        yield feature("contact smoothing", "contact.smoothing", words, contact=sharp)
     if bearing.damping.numbers:
-        undamped = replace(bearing, damping=Damping(law="none", numbers=()))
-        yield Feature(
-            name=f"contact damping{of}",
-            path=f"{bearing.path}.damping",
-            modelled=f"law {bearing.damping.law} at each {element.noun}",
-            without=_with(scene, undamped),
-        )
+        words = f"law {bearing.damping.law} at each {element.noun}"
+        yield feature("contact damping", "damping", words, damping=Damping(law="none", numbers=()))
     if bearing.damping.smoothing is not None:
-        kinked = replace(bearing, damping=replace(bearing.damping, smoothing=None))
-        yield Feature(
-            name=f"damping smoothing{of}",
-            path=f"{bearing.path}.damping.smoothing",
-            modelled="kink of the one-sided law at rest smoothed over a given speed",
-            without=_with(scene, kinked),
-        )
+        words = "kink of the one-sided law at rest smoothed over a given speed"
+        kinked = replace(bearing.damping, smoothing=None)
+        yield feature("damping smoothing", "damping.smoothing", words, damping=kinked)
     if bearing.inner is not None and bearing.inner.damping is not None:
-        free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
-        yield Feature(
-            name=f"inner ring damping{of}",
-            path=f"{bearing.path}.inner_ring.damping",
-            modelled="viscous damping of the inner ring to the frame",
-            without=_with(scene, free),
-        )
+        words = "viscous damping of the inner ring to the frame"
+        free = replace(bearing.inner, damping=None)
+        yield feature("inner ring damping", "inner_ring.damping", words, inner=free)
     if bearing.outer is not None:
-        start = bearing.initial
-        fixed = replace(
-            bearing, outer=None, initial=InitialState(position=start.position[:-2], velocity=start.velocity[:-2])
-        )
-        yield Feature(
-            name=f"outer ring{of}",
-            path=f"{bearing.path}.outer_ring",
-            modelled="outer ring on an elastic, damped housing: two coordinates more",
-            without=_with(scene, fixed),
-        )
+        words, start = "outer ring on an elastic, damped housing: two coordinates more", bearing.initial
+        fixed = InitialState(position=start.position[:-2], velocity=start.velocity[:-2])
+        yield feature("outer ring", "outer_ring", words, outer=None, initial=fixed)
     if bearing.cage is not None:
-        cage = bearing.cage
-        yield Feature(
-            name=f"cage{of}",
-            path=f"{bearing.path}.cage",
-            modelled="the cage's own speed: " + ("slip" if cage.slipping else "a given ratio"),
-            without=_with(scene, replace(bearing, cage=None)),
-        )
+        words = "the cage's own speed: " + ("slip" if bearing.cage.slipping else "a given ratio")
+        yield feature("cage", "cage", words, cage=None)
     for effect in bearing.effects:
+        words = element_words(EFFECTS[effect.kind].describe(effect), [bearing.element])
         rest = tuple(e for e in bearing.effects if e is not effect)
-        yield Feature(
-            name=f"{effect.kind}{of}",
-            path=f"{bearing.path}.{effect.kind}",
-            modelled=element_words(EFFECTS[effect.kind].describe(effect), [bearing.element]),
-            without=_with(scene, replace(bearing, effects=rest)),
-        )
+        yield feature(effect.kind, effect.kind, words, effects=rest)
 
 
 def _is_free(load: Load) -> bool:

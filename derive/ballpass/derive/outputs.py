@@ -5,17 +5,21 @@ In: the derived parts of a model.  Out: `Output` after `Output`, each an express
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.mechanism.kinematics import Pair
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output
+
+#: Name, expression, unit and description of an output.
+Words = tuple[str, sp.Expr, str, str]
 
 #: Key of the scene file under which its outputs stand.
 OUTPUTS = "run.outputs"
@@ -28,17 +32,17 @@ def named_rings(bearing: BearingModel, rate: str = "") -> Iterator[tuple[str, Co
         yield f"{bearing.names.prefix}{ring}.{rate}{axis}", c
 
 
-def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None) -> list[Output]:
+def made(rows: Iterable[Words]) -> list[Output]:
+    """Outputs of rows."""
+    return [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
+
+
+def bearing_outputs(bearing: BearingModel, load: Pair | None) -> list[Output]:
     """Outputs of a bearing, in the order of listing: rings, balls, sums over the balls, load on the inner ring."""
-    prefix = bearing.names.prefix
+    prefix, noun, ball = bearing.names.prefix, bearing.noun, bearing.ball
     of = f" of {prefix[:-1]}" if prefix else ""
-    out: list[Output] = []
-    for name, c in named_rings(bearing):
-        out.append(Output(name=name, expression=c.position, unit=c.unit, description=c.words[0]))
-    for name, c in named_rings(bearing, "v"):
-        out.append(Output(name=name, expression=c.velocity, unit=c.velocity_unit, description=c.words[1]))
-    ball = bearing.ball
-    noun = bearing.noun
+    rings: list[Words] = [(name, c.position, c.unit, c.words[0]) for name, c in named_rings(bearing)]
+    rings += [(name, c.velocity, c.velocity_unit, c.words[1]) for name, c in named_rings(bearing, "v")]
     per_ball = [
         (ball.deflection, "m", f"Deflection of each {noun}, Eq. (6)"),
         (ball.elastic_force, "N", f"Elastic force of each {noun}, Eq. (4)"),
@@ -46,74 +50,55 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
     if ball.damping_force is not None:
         per_ball.append((ball.damping_force, "N", f"Damping force of each {noun}, Eq. (10)"))
     per_ball.append((ball.force, "N", f"Elastic and damping force of each {noun}"))
-    out += [
-        Output(name=s.name, expression=s, unit=u, description=d + of, balls_of=prefix, per_ball=True)
-        for s, u, d in per_ball
-    ]
-    for ring, angle in (("outer", ball.in_outer), ("inner", ball.in_inner)):
+    sums: list[Words] = []
+    for ring, angle in (("outer", ball.cage.in_outer), ("inner", ball.cage.in_inner)):
         words = f"Angle of {noun} 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
         # with time in it the angle grows on from one reference time to the next; else the driver's whole turns count
         seen = _within_turn(angle, -sp.pi) if angle.has(TIME) else angle
-        out.append(Output(name=f"{prefix}cage.in_{ring}", expression=seen, unit="rad", description=words))
+        sums.append((f"{prefix}cage.in_{ring}", seen, "rad", words))
     for axis, total in zip("xy", ball.ring_force, strict=True):
         words = f"Force of the inner ring on the {noun}s{of} along {axis}, Eqs. (8) and (9)"
-        out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total, unit="N", description=words))
+        sums.append((f"{prefix}ring_force.{axis}", total, "N", words))
     for axis, force in zip("xy", load or (), strict=False):
-        words = f"External load on the inner ring{of} along {axis}"
-        out.append(Output(name=f"{prefix}load.{axis}", expression=force, unit="N", description=words))
-    return out
+        sums.append((f"{prefix}load.{axis}", force, "N", f"External load on the inner ring{of} along {axis}"))
+    return [
+        *made(rings),
+        *(
+            Output(name=s.name, expression=s, unit=u, description=d + of, balls_of=prefix, per_ball=True)
+            for s, u, d in per_ball
+        ),
+        *made(sums),
+    ]
 
 
 def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
     """Outputs of a mechanism, in the order of listing: reactions, drive, angles of the bodies."""
-    out: list[Output] = []
+    rows: list[Words] = []
     for joint in linkage.mechanism.joints:
-        first, second = joint.bodies
-        for axis, force in zip("xy", reactions.joint_force[joint.name], strict=True):
-            out.append(
-                Output(
-                    name=f"reaction.{joint.name}.{axis}",
-                    expression=force,
-                    unit="N",
-                    description=f"Force of the {second} on the {first} at {joint.name} along {axis}",
-                )
-            )
-        if joint.name in reactions.joint_moment:
-            out.append(
-                Output(
-                    name=f"reaction.{joint.name}.moment",
-                    expression=reactions.joint_moment[joint.name],
-                    unit="N*m",
-                    description=f"Moment of the {second} on the {first} at {joint.name}",
-                )
-            )
+        name, (first, second) = joint.name, joint.bodies
+        for axis, force in zip("xy", reactions.joint_force[name], strict=True):
+            words = f"Force of the {second} on the {first} at {name} along {axis}"
+            rows.append((f"reaction.{name}.{axis}", force, "N", words))
+        if name in reactions.joint_moment:
+            words = f"Moment of the {second} on the {first} at {name}"
+            rows.append((f"reaction.{name}.moment", reactions.joint_moment[name], "N*m", words))
     drive = linkage.drive
     torque = reactions.drive_torque if drive.torque is None else drive.torque
-    words = "Torque of the drive on the driven body, counter-clockwise"
-    out.append(Output(name="drive_torque", expression=torque, unit="N*m", description=words))
+    rows.append(("drive_torque", torque, "N*m", "Torque of the drive on the driven body, counter-clockwise"))
     if drive.whole is not None:
-        rows = (
+        rows += [
             ("drive_power", torque * drive.speed, "W", "Power of the drive"),
             ("driver.angle", drive.whole, "rad", "Angle of the driven body from +x, whole turns counted"),
             ("driver.speed", drive.speed, "rad/s", "Speed of the driven body"),
             ("driver.acceleration", drive.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
-        )
-        out += [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
+        ]
     if drive.coordinate is None:
-        words = "Angle of the driven body, within the turn"
         within = _within_turn(DRIVER_ANGLE, sp.S.Zero)
-        out.append(Output(name="drive_angle", expression=within, unit="rad", description=words))
-    for body in linkage.mechanism.bodies:
-        pose = linkage.poses[body.name]
-        out.append(
-            Output(
-                name=f"body.{body.name}.angle",
-                expression=sp.atan2(pose.sin, pose.cos),
-                unit="rad",
-                description=f"Angle of the x axis of the {body.name} from +x",
-            )
-        )
-    return out
+        rows.append(("drive_angle", within, "rad", "Angle of the driven body, within the turn"))
+    for body, pose in ((body.name, linkage.poses[body.name]) for body in linkage.mechanism.bodies):
+        words = f"Angle of the x axis of the {body} from +x"
+        rows.append((f"body.{body}.angle", sp.atan2(pose.sin, pose.cos), "rad", words))
+    return made(rows)
 
 
 def _within_turn(angle: sp.Expr, first: sp.Expr) -> sp.Expr:

@@ -21,18 +21,12 @@ from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.outputs import named_rings
+from ballpass.derive.outputs import Words, made, named_rings
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Output
 
-Words = tuple[str, sp.Expr, str, str]
-
 APPLIED = "Power of the drive, forces and torques, and of loads on rings loaded one-way"
-
-
-def _made(rows: Iterable[Words]) -> list[Output]:
-    return [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
 
 
 def power_of(efforts: Iterable[Effort]) -> sp.Expr:
@@ -60,7 +54,7 @@ def motion_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
         force = reactions.joint_force[joint.name]
         words = f"Magnitude of the force of the {joint.bodies[1]} on the {joint.bodies[0]} at {joint.name}"
         out.append((f"reaction.{joint.name}.magnitude", sp.sqrt(dot(force, force)), "N", words))
-    return _made(out)
+    return made(out)
 
 
 def power_outputs(
@@ -92,7 +86,7 @@ def power_outputs(
         out.append(("drive_power", power, "W", "Power of the drive"))
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2
     out.append(("kinetic_energy", energy, "J", "Kinetic energy of all moving parts, without rings loaded one-way"))
-    return _made(out)
+    return made(out)
 
 
 def balance_outputs(outputs: Sequence[Output]) -> list[Output]:
@@ -129,15 +123,8 @@ def balance_outputs(outputs: Sequence[Output]) -> list[Output]:
 
 def ring_outputs(model: BearingModel) -> list[Output]:
     """Accelerations of the rings' centres."""
-    return [
-        Output(
-            name=name,
-            expression=c.acceleration,
-            unit=f"{c.unit}/s^2",
-            description=f"Acceleration {c.description}",
-        )
-        for name, c in named_rings(model, "a")
-    ]
+    rings = named_rings(model, "a")
+    return made((name, c.acceleration, f"{c.unit}/s^2", f"Acceleration {c.description}") for name, c in rings)
 
 
 def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
@@ -150,53 +137,24 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     deflection = next(d.expression for d in ball.definitions if d.symbol == ball.deflection)
     x, y = (c.position for c in model.coordinates[:2])
     axes_of = {"xx": (x, x), "xy": (x, y), "yy": (y, y)}
-    out = [
-        Output(
-            name=f"{names.prefix}contact.stiffness.{axes}",
-            expression=count
-            * (slope * sp.diff(deflection, one) * sp.diff(deflection, other) + force * sp.diff(deflection, one, other)),
-            unit="N/m",
-            description=names.words(f"Entry {axes} of the stiffness matrix of all balls") + of,
-            balls_of=names.prefix,
-            over_balls=True,
-        )
-        for axes, (one, other) in axes_of.items()
-    ]
-    out += [
-        Output(
-            name=f"{names.prefix}ball.stiffness",
-            expression=slope,
-            unit="N/m",
-            description=names.words("Slope of the elastic force of each ball") + f"{of} by its deflection",
-            per_ball=True,
-            balls_of=names.prefix,
-        )
-    ]
+    out = []
+    for axes, (one, other) in axes_of.items():
+        steep = slope * sp.diff(deflection, one) * sp.diff(deflection, other)
+        entry = count * (steep + force * sp.diff(deflection, one, other))
+        words = names.words(f"Entry {axes} of the stiffness matrix of all balls") + of
+        out.append(_of_balls(names, f"contact.stiffness.{axes}", entry, "N/m", words, over_balls=True))
+    words = names.words("Slope of the elastic force of each ball") + f"{of} by its deflection"
+    out.append(_of_balls(names, "ball.stiffness", slope, "N/m", words))
     element = ELEMENTS[bearing.element]
     if bearing.contact.smoothing is None:  # k delta^n from 0 on
-        out.append(
-            Output(
-                name=f"{names.prefix}contact.energy",
-                expression=count * force * ball.deflection / (element.exponent + 1),
-                unit="J",
-                description=f"Potential energy of the elastic forces of all {element.noun}s{of}",
-                balls_of=names.prefix,
-                over_balls=True,
-            )
-        )
+        energy = count * force * ball.deflection / (element.exponent + 1)
+        words = f"Potential energy of the elastic forces of all {element.noun}s{of}"
+        out.append(_of_balls(names, "contact.energy", energy, "J", words, over_balls=True))
     for ring, (constants, quantities) in element.contact_quantities(bearing, names, force).items():
-        out += [
-            Output(
-                name=f"{names.prefix}ball.{ring}_{quantity.name}",
-                expression=sp.Piecewise((quantity.expression, force > 0), (0, True)),
-                unit=quantity.unit,
-                description=quantity.description.format(f"each {element.noun}'s contact{of}"),
-                per_ball=True,
-                balls_of=names.prefix,
-                constants=constants,
-            )
-            for quantity in quantities
-        ]
+        for one in quantities:
+            value = sp.Piecewise((one.expression, force > 0), (0, True))
+            words = one.description.format(f"each {element.noun}'s contact{of}")
+            out.append(_of_balls(names, f"ball.{ring}_{one.name}", value, one.unit, words, constants=constants))
     return out
 
 
@@ -240,9 +198,9 @@ def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | No
     force = ball.ring_force  # of the inner ring on the balls
     # where rings are loaded one-way the cage's moments have no effect
     moment = cross(apart, force)
-    power = count * ((moment * ball.cage_speed if load is None else sp.S.Zero) - dot(force, parting))
-    if load is None and ball.ring_rate is not None:
-        power += count * sum(total.symbol for total in ball.sums[2:]) * ball.ring_rate
+    power = count * ((moment * ball.cage.rate if load is None else sp.S.Zero) - dot(force, parting))
+    if load is None and ball.cage.ring_rate is not None:
+        power += count * sum(total.symbol for total in ball.sums[2:]) * ball.cage.ring_rate
     rows.append(("cage.moment", count * moment, "N*m", f"Moment of the rings on the cage{of}, counter-clockwise"))
     rows.append(("contact.power", power, "W", names.words("Power of all ball forces") + of))
     if load is not None:
@@ -255,27 +213,34 @@ def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | No
         if bearing.inner is not None and bearing.inner.damping is not None:
             loss = symbol_of(bearing.inner.damping) * dot(speed, speed)
             rows.append(("inner.loss", loss, "W", f"Power loss of the damper of the inner ring{of}"))
-    made = _made((f"{names.prefix}{n}", e, u, d) for n, e, u, d in rows)
+    found = made((f"{names.prefix}{n}", e, u, d) for n, e, u, d in rows)
     if ball.damping_force is not None:
         taken = ball.damping_force * ball.deflection_rate
-        made.append(
-            Output(
-                name=f"{names.prefix}ball.loss",
-                expression=taken,
-                unit="W",
-                description=names.words("Power loss by the damping force of each ball") + of,
-                per_ball=True,
-                balls_of=names.prefix,
-            )
-        )
-        made.append(
-            Output(
-                name=f"{names.prefix}contact.loss",
-                expression=count * taken,
-                unit="W",
-                description=names.words("Power loss by the damping forces of all balls") + of,
-                balls_of=names.prefix,
-                over_balls=True,
-            )
-        )
-    return made
+        words = names.words("Power loss by the damping force of each ball") + of
+        found.append(_of_balls(names, "ball.loss", taken, "W", words))
+        words = names.words("Power loss by the damping forces of all balls") + of
+        found.append(_of_balls(names, "contact.loss", count * taken, "W", words, over_balls=True))
+    return found
+
+
+def _of_balls(
+    names: Names,
+    name: str,
+    expression: sp.Expr,
+    unit: str,
+    description: str,
+    *,
+    over_balls: bool = False,
+    constants: tuple[Definition, ...] = (),
+) -> Output:
+    """An output of each ball, or their sum."""
+    return Output(
+        name=f"{names.prefix}{name}",
+        expression=expression,
+        unit=unit,
+        description=description,
+        per_ball=not over_balls,
+        balls_of=names.prefix,
+        over_balls=over_balls,
+        constants=constants,
+    )

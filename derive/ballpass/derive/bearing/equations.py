@@ -31,13 +31,11 @@ Pair = tuple[sp.Expr, sp.Expr]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BallRelations:
-    """The generic ball j at the angle ``cage_angle + 2 pi (j - 1) / count``.
+    """The generic ball j at the angle ``cage.angle + 2 pi (j - 1) / count``.
 
     Attributes
     ----------
-    cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s]
-    cage_share, ring_rate : see `cage.Cage`
-    in_outer, in_inner : angle of ball 1 as the rings see it, see `cage.Cage` [rad]
+    cage : how the balls turn
     cos, sin : of the angle of ball j
     cosine : factor of all sums of forces: of the contact angle; 1 where the scene names none
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
@@ -50,12 +48,7 @@ class BallRelations:
     """
 
     count: int
-    cage_angle: sp.Expr
-    cage_speed: sp.Symbol
-    cage_share: sp.Expr
-    ring_rate: sp.Symbol | None
-    in_outer: sp.Expr
-    in_inner: sp.Expr
+    cage: Cage
     cos: sp.Symbol
     sin: sp.Symbol
     cosine: sp.Expr
@@ -235,12 +228,7 @@ def _ball(
         sums += (names.define(torque, force * own.slope, "N*m", words, r"\textstyle\sum_j F_j e'_j"),)
     ball = BallRelations(
         count=bearing.balls,
-        cage_angle=cage.angle,
-        cage_speed=speed,
-        cage_share=cage.share,
-        ring_rate=cage.ring_rate,
-        in_outer=cage.in_outer,
-        in_inner=cage.in_inner,
+        cage=cage,
         cos=cos,
         sin=sin,
         cosine=cosine,

@@ -86,13 +86,13 @@ def couple(bearing: Bearing, model: BearingModel, linkage: Linkage) -> Coupled:
     moment = cross(subtract(inner.position, outer.position), force)
     apart = subtract(inner.velocity, outer.velocity)
     efforts = [Effort(amount=-f, rate=v) for f, v in zip(force, apart, strict=True)]
-    efforts.append(Effort(amount=moment, rate=ball.cage_speed))
-    share = ball.cage_share
+    efforts.append(Effort(amount=moment, rate=ball.cage.rate))
+    share = ball.cage.share
     points = [body_point(mechanism, body, joint.point(body)) for body in bodies]
     torques = [share * moment, (1 - share) * moment]
     for torque in (count * total.symbol for total in ball.sums[2:]):  # of the slopes of effects, between both rings
-        assert ball.ring_rate is not None
-        efforts.append(Effort(amount=torque, rate=ball.ring_rate))
+        assert ball.cage.ring_rate is not None
+        efforts.append(Effort(amount=torque, rate=ball.cage.ring_rate))
         torques = [torques[0] + torque, torques[1] - torque]
     carried, inertias, weights = ZERO, list[Inertia](), list[Effort]()
     if bearing.outer is not None:

@@ -127,7 +127,7 @@ def _contact(tex: _Printer, model: BearingModel) -> list[str]:
     return [
         f"## Contact{f' of {name}' if name else ''}",
         model.names.words(rf"Ball $j = 1 \dots {ball.count}$ at the angle"),
-        _equation(rf"{angle} = \frac{{2\pi (j - 1)}}{{{ball.count}}} + {tex(ball.cage_angle)}"),
+        _equation(rf"{angle} = \frac{{2\pi (j - 1)}}{{{ball.count}}} + {tex(ball.cage.angle)}"),
         *_definitions(tex, ball.definitions),
         model.names.words("Sums over the balls:"),
         *(_line(tex, s, rf"\sum_{{j=1}}^{{{ball.count}}} {tex(s.expression)}") for s in ball.sums),

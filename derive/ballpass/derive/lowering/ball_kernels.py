@@ -107,7 +107,7 @@ class BallBuilder:
         self.general = affine is None or (own is not None and own.slope is not None)
         leaves = {symbol: ca.SX.sym(symbol.name) for symbol in states}
         self._of_ball = of_all(self._hoist, leaves) if self.general else of_state
-        cage = [sp.cos(bearing.ball.cage_angle), sp.sin(bearing.ball.cage_angle)]
+        cage = [sp.cos(bearing.ball.cage.angle), sp.sin(bearing.ball.cage.angle)]
         rings = ca.vertcat(*map(of_state, affine or [sp.S.Zero] * RINGS), *map(of_state, cage))
         co, si, r = self.co, self.si, self.r
         self._rows = self._ball(None if affine is None else relative_motion(r, co, si), co, si)

@@ -149,7 +149,7 @@ class _Lowering:
         if system.outputs:
             bodies.append(("outputs", self._outputs(balls), "outputs of the scene"))
         if system.bearings:
-            turned = [self.visit(bearing.ball.cage_angle) for bearing in system.bearings]
+            turned = [self.visit(bearing.ball.cage.angle) for bearing in system.bearings]
             bodies.append(("cages", {"angles": ca.vertcat(*turned)}, "angle of ball 1 of each bearing [rad]"))
         windows = [s for s in system.switches if s.angle is not None]
         if windows:
@@ -296,7 +296,7 @@ class _Lowering:
         out: Balls = {}
         for bearing in self.system.bearings:
             ball = bearing.ball
-            cage = visit(ball.cage_angle)
+            cage = visit(ball.cage.angle)
             sine, cosine = ca.sin(cage), ca.cos(cage)
             definitions = {d.symbol: d.expression for d in ball.definitions} | dict(instead or {})
             out[bearing.names.prefix] = []

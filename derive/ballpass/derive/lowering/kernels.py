@@ -176,7 +176,7 @@ class KernelBuilder:
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
         state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
-        seen = [self._visit(angle) for b in bearings for angle in (b.ball.in_outer, b.ball.in_inner)]
+        seen = [self._visit(angle) for b in bearings for angle in (b.ball.cage.in_outer, b.ball.cage.in_inner)]
         return [
             (
                 "stage",
@@ -240,7 +240,9 @@ class KernelBuilder:
             return found
 
         balls = [b.ball for b in self._system.bearings]
-        moving = used(e for ball in balls for e in (ball.cage_angle, ball.cage_speed, ball.ring_rate) if e is not None)
+        moving = used(
+            e for ball in balls for e in (ball.cage.angle, ball.cage.rate, ball.cage.ring_rate) if e is not None
+        )
         both = moving & used([*self._system.mass, *self._system.forcing])
         return [s for s in self._definitions if s in both and used([s]) & states]
 
