@@ -133,7 +133,7 @@ def test_rows_that_do_not_begin_at_the_start_are_refused(scene_text: Callable[..
         scene_from_text(scene_text("varying_compliance", ("[bearing.inner_ring]", table)), "late")
 
 
-def test_a_ring_that_stands_is_passed_at_the_mean_speed_of_a_cage_that_slips(make_virtual: Callable[..., Model]) -> None:
+def test_a_ring_that_stands_is_passed_at_the_mean_speed_of_a_slipping_cage(make_virtual: Callable[..., Model]) -> None:
     """Of a shaft that carries the outer ring the balls passed the inner one as with the last slip."""
     slip = '[bearing.cage]\nslip = { time = ["0 s", "0.03 s"], value = [0.0, 0.2] }\n[bearing.inner_ring]'
     outer = ("[shaft]\n", '[shaft]\nring = "outer"\n')

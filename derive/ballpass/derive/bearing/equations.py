@@ -261,26 +261,14 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
             return share
         return cage.rate - sp.diff(cage.angle - angle, TIME)
 
+    seen = (
+        (on_outer, cage.in_outer, cage.share, "outer", " as the outer ring sees it"),
+        (on_inner, cage.in_inner, cage.share - 1, "inner", " as the inner ring sees it"),
+        (from_first, sp.S.Zero, sp.S.Zero, "first", " from ball 1"),
+    )
     axes = [
-        AngleAxes(angle=on_outer, rate=rate(cage.in_outer, cage.share))
-        if cage.in_outer == cage.angle
-        else AngleAxes(
-            angle=on_outer,
-            rate=rate(cage.in_outer, cage.share),
-            turned=cage.angle - cage.in_outer,
-            name="outer",
-            words=" as the outer ring sees it",
-        ),
-        AngleAxes(
-            angle=on_inner,
-            rate=rate(cage.in_inner, cage.share - 1),
-            turned=cage.angle - cage.in_inner,
-            name="inner",
-            words=" as the inner ring sees it",
-        ),
-        AngleAxes(
-            angle=from_first, rate=rate(sp.S.Zero, sp.S.Zero), turned=cage.angle, name="first", words=" from ball 1"
-        ),
+        AngleAxes(angle=angle, rate=rate(at, share), turned=cage.angle - at, name=name, words=words)
+        for angle, at, share, name, words in seen
     ]
     further = {}
     if cage.spin is not None:

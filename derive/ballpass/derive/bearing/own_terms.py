@@ -42,14 +42,14 @@ class AngleAxes:
     angle : of ball j in them, a function of `TIME` [rad]
     rate : its constant derivative by time, or by the angle of the inner ring relative to the outer one
     turned : how far they are turned [rad]; zero where they stand still
-    name, words : of the axes, of their symbols and for people; empty where they stand still
+    name, words : of the axes, of their symbols and for people; not used where they stand still
     """
 
     angle: sp.Expr
     rate: sp.Expr
-    turned: sp.Expr = sp.S.Zero
-    name: str = ""
-    words: str = ""
+    turned: sp.Expr
+    name: str
+    words: str
 
 
 def own_terms(
@@ -130,14 +130,15 @@ class _Multiples:
         return a * c - b * d, b * c + a * d
 
     def _defined(self, n: int, values: tuple[sp.Expr, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
-        of, label = (f"{self.axes.name}_", rf"_{{j,{self.axes.name[0]}}}") if self.axes.name else ("", "_j")
+        name, words = (self.axes.name, self.axes.words) if self.axes.turned != 0 else ("", "")
+        of, label = (f"{name}_", rf"_{{j,{name[0]}}}") if name else ("", "_j")
         symbols = tuple(self._names.variable(f"ball.{f}_{of}{n}") for f in ("cos", "sin"))
         self.definitions += [
             self._names.define(
                 symbol,
                 value,
                 "1",
-                f"{word} of {n} times the angle of ball j{self.axes.words}",
+                f"{word} of {n} times the angle of ball j{words}",
                 rf"\{f} {n}\theta{label}",
             )
             for symbol, value, word, f in zip(symbols, values, ("Cosine", "Sine"), ("cos", "sin"), strict=True)

@@ -25,7 +25,7 @@ from ballpass.derive.scene.bearing_records import (
     InnerRing,
     OuterRing,
 )
-from ballpass.derive.scene.keys import ChoiceKey, PairKey
+from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
@@ -51,6 +51,14 @@ ELEMENT = ChoiceKey(
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))
 SUPPORT = ChoiceKey(words="Support of the outer ring", choices=("elastic", "fixed"), note="fixed: nothing else")
 LAW = ChoiceKey(words="Law of the damping at a ball", choices=tuple(LAWS))
+_MOVING_OUTER = (
+    Needs(
+        key="support",
+        value="elastic",
+        why="a fixed outer ring has no initial state",
+        remedy='delete the key, or write support = "elastic" in the table outer_ring',
+    ),
+)
 #: Keys of the start, in this order.
 INITIAL = {
     f"{part}{ending}": PairKey(
@@ -60,6 +68,7 @@ INITIAL = {
         example=f"0 {unit}",
         default=f"0 {unit}",
         when="default: zeros" + "; refused with a fixed outer ring" * (part == "outer"),
+        needs=_MOVING_OUTER * (part == "outer"),
     )
     for ending, unit, words, accent in (("", "m", "Centre", ""), ("_velocity", "m/s", "Velocity", r"\dot "))
     for part in ("inner", "outer")
@@ -84,7 +93,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         catalogue = fill_by_designation(table)
         element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
         joint, share, count = _read_place(table, mechanism, driven, coupling)
-        support = _read_outer_ring(table)
+        support, outer = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
         contact = table.data.get("contact")
         stiff = isinstance(contact, dict) and "stiffness" in contact
@@ -104,8 +113,8 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             damping=_read_damping(table, element),
             effects=_read_effects(table, numbers["balls"]),
             inner=_read_inner_ring(table, mechanism is not None) if coupling == "one-way" else None,
-            outer=support,
-            initial=_read_initial(table, moving_outer=support is not None),
+            outer=outer,
+            initial=_read_initial(table, support),
             element=element.name,
             catalogue=catalogue,
             cage=read_cage(table),
@@ -208,23 +217,20 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
             return read_record(InnerRing, ring, mass=read_record(EquivalentMass, parts))
 
 
-def _read_outer_ring(table: Table) -> OuterRing | None:
+def _read_outer_ring(table: Table) -> tuple[str | None, OuterRing | None]:
+    """Support of the outer ring, None with a fault, and its numbers where it moves."""
     with table.table("outer_ring", 'support = "fixed"') as ring:
         ring.know("support")
         support = SUPPORT.read(ring, "support")
         found = read_record(OuterRing, ring, facts={"support": support})
-    return found if support == "elastic" else None
+    return support, found if support == "elastic" else None
 
 
-def _read_initial(table: Table, *, moving_outer: bool) -> InitialState:
+def _read_initial(table: Table, support: str | None) -> InitialState:
     with table.table("initial", required=False) as initial:
-        initial.know(*INITIAL)
-        ring = table.data.get("outer_ring")
-        if isinstance(ring, dict) and ring.get("support") == "fixed":  # another support has a fault itself
-            remedy = 'delete the key, or write support = "elastic" in the table outer_ring'
-            initial.refuse(("outer", "outer_velocity"), "a fixed outer ring has no initial state", remedy=remedy)
-        kept = [key for key in INITIAL if moving_outer or not key.startswith("outer")]
-        read = {key: INITIAL[key].read(initial, key) for key in kept}
-        position = tuple(q for key in kept if "velocity" not in key for q in read[key])
-        velocity = tuple(q for key in kept if "velocity" in key for q in read[key])
-    return InitialState(position=position, velocity=velocity)
+        read = read_keys(initial, INITIAL, facts={"support": support})
+    given = {key: pair for key, pair in read.items() if pair is not None}
+    return InitialState(
+        position=tuple(q for key, pair in given.items() if "velocity" not in key for q in pair),
+        velocity=tuple(q for key, pair in given.items() if "velocity" in key for q in pair),
+    )

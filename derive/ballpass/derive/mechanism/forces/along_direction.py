@@ -38,7 +38,7 @@ class AlongDirection(Pathway):
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Distance and its rate; the force on the wall acts where the point is."""
-        mechanism, ledger, label, mark = setting.mechanism, setting.ledger, force.label, subscript(force.name)
+        mechanism, ledger, label, mark = setting.linkage.mechanism, setting.ledger, force.label, subscript(force.name)
         places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
         poses = [setting.linkage.pose(body) for body in self.bodies]
         one, two = (pose.motion(place) for pose, place in zip(poses, places, strict=True))

@@ -40,7 +40,7 @@ NO_FORCES = Forces(loads=(), of_each=MappingProxyType({}), definitions=(), input
 
 def derive_forces(linkage: Linkage) -> Forces:
     """Derive the loads of all forces and torques of a mechanism."""
-    setting = Setting(mechanism=linkage.mechanism, linkage=linkage, drive=linkage.drive)
+    setting = Setting(linkage=linkage)
     loads: dict[str, tuple[AppliedLoad, ...]] = {}
     for force in linkage.mechanism.forces:
         action = force.pathway.act(force, setting)

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive, OverAngle
+from ballpass.derive.drive import OverAngle
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
@@ -25,7 +25,7 @@ from ballpass.derive.scene.body_keys import Points, check_names
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.read_keys import keys_of, read_record
-from ballpass.derive.scene.records import Driver, Force, Mechanism
+from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output, StateSwitch
@@ -42,9 +42,7 @@ class Setting:
     others use.
     """
 
-    mechanism: Mechanism
     linkage: Linkage
-    drive: Drive
     ledger: Ledger = field(default_factory=Ledger)
     constants: list[Definition] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)

@@ -32,7 +32,7 @@ class JointMotion(Pathway):
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Rate of the joint, and the loads on its bodies by an amount."""
-        joints = {joint.name: joint for joint in setting.mechanism.joints}
+        joints = {joint.name: joint for joint in setting.linkage.mechanism.joints}
         joint = joints.get(self.joint)
         if joint is None or joint.kind != self.kind:
             fits = [name for name, other in joints.items() if other.kind == self.kind]
@@ -94,7 +94,7 @@ class JointTravel(JointMotion):
         """Rate of the travel; both points of the joint lie on one line along the guide, in which the force acts."""
         guides = (placement.guide for placement in setting.linkage.placements)
         guide = next(guide for guide in guides if guide is not None and guide.joint == joint)
-        places = [joint_point(setting.mechanism, joint, body) for body in joint.bodies]
+        places = [joint_point(setting.linkage.mechanism, joint, body) for body in joint.bodies]
         one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(joint.bodies, places, strict=True))
         return Action(
             loads=lambda force: tuple(

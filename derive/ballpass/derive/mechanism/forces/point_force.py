@@ -42,7 +42,7 @@ class PointForce(Pathway):
 
     def act(self, force: Force, setting: Setting) -> Action:
         """The force times the law's factor."""
-        point = body_point(setting.mechanism, self.body, self.point)
+        point = body_point(setting.linkage.mechanism, self.body, self.point)
         vector = components(self.force)
         if self.direction is not None:
             angle = symbol_of(self.direction)

@@ -30,7 +30,7 @@ class TwoPoints(Pathway):
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Length, its rate and the direction of the line."""
-        mechanism, ledger, label, mark = setting.mechanism, setting.ledger, force.label, subscript(force.name)
+        mechanism, ledger, label, mark = setting.linkage.mechanism, setting.ledger, force.label, subscript(force.name)
         self._refuse_hinge(force, mechanism)
         places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
         one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(self.bodies, places, strict=True))

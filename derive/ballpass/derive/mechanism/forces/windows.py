@@ -91,7 +91,9 @@ class Windows(Law):
         """The gate; of a window with a rise a table over the angle, from 0 to 1 and back."""
         if self.windows[0].rise is not None:
             return setting.over_angle(self._flanks(force, setting))
-        return setting.over_angle(setting.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows]))
+        return setting.over_angle(
+            setting.linkage.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows])
+        )
 
     def _flanks(self, force: Force, setting: Setting) -> OverAngle:
         """0, 1, 1 and 0 at four angles of the driver."""
@@ -118,7 +120,7 @@ class Windows(Law):
         )
         none, full = (one.symbol.name for one in heights)
         angles = [window.start.path, *(one.symbol.name for one in knots)]
-        found = setting.drive.table(name, "1", angles, [none, full, full, none])
+        found = setting.linkage.drive.table(name, "1", angles, [none, full, full, none])
         return replace(found, constants=(*knots, *heights, *found.constants))
 
     def words(self) -> str:
