@@ -220,7 +220,7 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
 def _read_outer_ring(table: Table) -> tuple[str | None, OuterRing | None]:
     """Support of the outer ring, None with a fault, and its numbers where it moves."""
     with table.table("outer_ring", 'support = "fixed"') as ring:
-        ring.know("support")
+        ring.know("support", *keys_of(OuterRing))
         support = SUPPORT.read(ring, "support")
         found = read_record(OuterRing, ring, facts={"support": support})
     return support, found if support == "elastic" else None

@@ -56,9 +56,8 @@ class AngleTable(Law):
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The table's value."""
         knots, values = ([q.path for q in column] for column in (self.angle, self.values))
-        return setting.over_angle(
-            setting.linkage.drive.table(force.label, force.pathway.unit, knots, values, self.turns)
-        )
+        drive, unit = setting.linkage.drive, force.pathway.unit
+        return setting.over_angle(drive.table(force.label, unit, knots, values, self.turns))
 
     def words(self) -> str:
         """Number of rows."""

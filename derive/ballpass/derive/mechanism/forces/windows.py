@@ -91,9 +91,8 @@ class Windows(Law):
         """The gate; of a window with a rise a table over the angle, from 0 to 1 and back."""
         if self.windows[0].rise is not None:
             return setting.over_angle(self._flanks(force, setting))
-        return setting.over_angle(
-            setting.linkage.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows])
-        )
+        windows = [(window.start.path, window.end.path) for window in self.windows]
+        return setting.over_angle(setting.linkage.drive.gate(force.name, windows))
 
     def _flanks(self, force: Force, setting: Setting) -> OverAngle:
         """0, 1, 1 and 0 at four angles of the driver."""
