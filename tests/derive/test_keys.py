@@ -7,6 +7,7 @@ import json
 import math
 import re
 import tomllib
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,6 +33,7 @@ from ballpass.derive.scene.keys import (
     WholeKey,
 )
 from ballpass.derive.scene.quantity import Bounds
+from ballpass.derive.scene.read_keys import read_keys
 from ballpass.derive.scene.table import MISSPELT, Collector, Table
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.derive.scene.units import COMMON, KINDS
@@ -43,6 +45,10 @@ KEYS = {
     for section in sections()
     for name, key in section.keys.items()
 }
+
+
+#: Neither stiff nor damped.
+WITHOUT_LAW = '[mechanism.springs.s]\nbodies = ["frame", "rod"]\npoints = ["A", "B"]\npreload = "1 N"\n'
 
 
 def refused(text: str) -> list[str]:
@@ -82,6 +88,7 @@ def test_shipped_scenes_fit_the_schema(file: Path) -> None:
         ("cycles = 4 ", 'cycles = 4\nduration = "1 s"\n#', "run"),
         ('title = "P', f'title = "{"P" * 200}', "title"),
         ("[bearing.initial]", "[bearing.inital]", "bearing.inital"),
+        ("[mechanism.joints.A]", f"{WITHOUT_LAW}[mechanism.joints.A]", "mechanism.springs.s"),
     ],
 )
 def test_schema_marks_what_the_reader_refuses(old: str, new: str, place: str) -> None:
@@ -195,3 +202,28 @@ def test_schema_requires_the_law_that_decides_about_other_keys() -> None:
     text = (SCENES / "rotor.toml").read_text(encoding="utf-8")
     assert refused(text) == []
     assert refused(text.replace('law = "none"', "")) == ["bearing.damping"]
+
+
+@pytest.mark.parametrize("name", [name for name, key in KEYS.items() if key.needs])
+def test_a_key_is_refused_where_the_scene_does_not_say_what_it_needs(name: str) -> None:
+    """And is no fault where a value that it needs is unknown, which has been reported, or where it is not given."""
+    key, own = KEYS[name], name.rpartition(".")[2]
+    given = {own: key.choices[0] if isinstance(key, ChoiceKey) else tomllib.loads(f"x = {key.sample}")["x"]}
+    met: dict[str, Any] = {need.key: need.value or "given" for need in key.needs}
+
+    def read(data: dict[str, Any], facts: dict[str, Any]) -> tuple[Any, list[Any]]:
+        with collected(data) as table:
+            value = read_keys(table, {own: replace(key, optional=True)}, facts=facts)[own]
+        return value, table.collector.faults
+
+    for need in key.needs:
+        value, (fault,) = read(given, {**met, need.key: "another" if need.value else None})
+        assert value is None
+        assert (fault.key, fault.problem, fault.allowed) == (own, need.why, f"{own} only with {need}")
+        assert fault.remedy
+        assert read({}, {**met, need.key: "another" if need.value else None}) == (None, [])
+        if need.value:
+            assert read(given, {**met, need.key: None}) == (None, [])
+    value, faults = read(given, met)
+    assert value is not None
+    assert faults == []
