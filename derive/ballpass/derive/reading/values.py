@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
+from itertools import pairwise
 from typing import Any, cast
 
 from ballpass.derive.bearing.effects import EFFECTS
@@ -19,10 +20,11 @@ from ballpass.derive.scene.bearing_records import Bearing, CageMotion
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
-from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
+from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, Shaft, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.units import split_setting
+from ballpass.runtime.time.turning import Turning
 
 #: Last parts of keys of the file that are no quantities, for the message about an override of one.
 _STRUCTURE = ("balls", "designation", "joint", "law", "support")
@@ -299,21 +301,34 @@ def _check_run(checker: Checker, scene: Scene) -> None:
     source = scene.mechanism.driver if scene.mechanism is not None else scene.shaft
     run, within = scene.run, ""
     turns = run.cycles if (run.cycles or 0.0) > 0.0 else None
-    if source is not None and source.speed.value == 0.0 and run.cycles is not None:
+    turning = None if source is None else _turning(source)
+    if source is not None and turning is not None and turns is not None and math.isinf(turning.after(turns)):
         checker.fault(
             "run.cycles",
-            "the speed at the start is zero, so that no time is a cycle",
-            f"{source.speed.path} = {checker.show(source.speed)}",
-            "a duration where the speed is zero",
+            "nothing turns, or not so often",
+            f"{turns:g} cycles; {source.speed.path} = {checker.show(source.speed)}",
+            "a duration where the speed is zero; turns that are made until the driver stands",
             'write duration = "0.5 s" instead of cycles (or run with --duration "0.5 s"), or give a speed',
         )
-    if source is not None and run.duration is not None:
-        turns, within = run.duration * abs(source.speed.value) / math.tau, f" in {run.duration:g} s"
+    if turning is not None and run.duration is not None:
+        turns, within = turning.turns(0.0, run.duration), f" in {run.duration:g} s"
     if turns is not None and turns <= run.transient_cycles and run.transient_cycles > 0.0:
         checker.fault(
             "run.transient_cycles",
             "the transient cycles fill the whole run",
             f"{run.transient_cycles:g} of {turns:g} cycles{within}",
             "fewer cycles than the run has",
-            longer_words(run.transient_cycles, turning=source is not None and source.speed.value != 0.0),
+            longer_words(run.transient_cycles, turning=turning is not None and turning.fastest > 0.0),
         )
+
+
+def _turning(source: Driver | Shaft) -> Turning:
+    """The angle of driver or shaft over time, of its first speed where no table gives it."""
+    table = source.table if isinstance(source, Driver) else None
+    times, speeds = [], [source.speed.value]
+    if table is not None:
+        times = [number.value for number in table.time]
+        speeds += [number.value for number in table.later_speed]
+    if not times or not all(map(math.isfinite, [*times, *speeds])) or any(b <= a for a, b in pairwise(times)):
+        return Turning.even(0.0, speeds[0])  # faults of the table have been reported
+    return Turning.by_speeds(0.0, times, speeds)
