@@ -85,9 +85,9 @@ class Strobe:
         repeats = period_of(states, magnitude)
         if self.period is None or repeats == 1:
             return None
-        for period in range(1, (repeats or LONGEST_SOUGHT + 1)):
+        for period in range(1, repeats or min(LONGEST_SOUGHT, len(states) // 4) + 1):
             changes = changes_after(states, magnitude, period)
-            third = len(changes) // 3
+            third = max(len(changes) // 3, 1)
             if repeats % period or (not repeats and not np.max(changes[-third:]) < FALLS * np.max(changes[:third])):
                 continue
             shooting = Shooting(

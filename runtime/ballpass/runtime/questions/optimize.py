@@ -459,10 +459,17 @@ def optimize(
 
 
 def _valleys(points: np.ndarray, merits: np.ndarray) -> np.ndarray:
-    """The points of a sweep that are less than those on both sides, the least first."""
-    beside = np.concatenate([[np.inf], merits, [np.inf]])
-    lowest = np.flatnonzero((merits < beside[2:]) & (merits <= beside[:-2]))
-    return points[lowest[np.argsort(merits[lowest], kind="stable")]]
+    """The points of a sweep that are less than those on both sides, the least first.
+
+    Those are left out that would not be the least if they fell once more by what they lie below their neighbours.
+    """
+    before, behind = np.append(np.inf, merits[:-1]), np.append(merits[1:], np.inf)
+    lowest = np.flatnonzero((merits < behind) & (merits <= before))
+    beside = np.stack([before, behind])[:, lowest]
+    above = np.max(np.where(np.isfinite(beside), beside, -np.inf), axis=0)
+    could = 2.0 * merits[lowest] - np.where(np.isfinite(above), above, np.inf) <= np.min(merits)
+    lowest = lowest[could]
+    return np.asarray(points[lowest[np.argsort(merits[lowest], kind="stable")]])
 
 
 def _apart(points: np.ndarray, count: int) -> np.ndarray:
