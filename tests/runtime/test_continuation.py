@@ -87,6 +87,14 @@ def test_a_complex_pair_that_passes_the_circle_is_told_from_two_real_ones_of_pro
     assert not any(point.stable for point in real_ones.points)
 
 
+def test_a_multiplier_that_jumps_across_the_circle_is_no_doubling() -> None:
+    """As where a contact grazes: it is -0.5 before and -3 behind."""
+    found = branch_of(at_rest(lambda v: np.array([[-0.5 if v < 0.4 else -3.0]])), np.zeros(1), 0.0)
+    assert not found.special
+    ((one, other),) = found.unlocated
+    assert one.value < 0.4 < other.value < one.value + 0.01
+
+
 def test_a_branch_that_turns_back_leaves_its_range_by_the_first_end() -> None:
     """x^2 = 1/2 - value, of which the lower half attracts."""
     found = branch_of(lambda x, v: ([x[0] ** 2 + v - 0.5], [[2.0 * x[0]]], [1.0]), [-math.sqrt(0.5)], 0.0)

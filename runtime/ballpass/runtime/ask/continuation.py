@@ -55,6 +55,9 @@ FALLS, SOUGHT = 0.7, 12
 #: Distances from a located point at which multipliers confirm it, as shares of a step; least share that is halved.
 SIDES, HALVED = (1e-3, 1e-5), 1.0 / 64.0
 
+#: A multiplier that passes the unit circle is so near to it at the located point; else it jumps across [1].
+ON_CIRCLE = 1e-3
+
 #: First step onto a branch of twice the period, in shares of the range or of magnitudes.
 ASIDE = 2e-3
 
@@ -94,6 +97,11 @@ class BranchPoint:
     def stable(self) -> bool:
         return bool(abs(self.multipliers[0]) < 1.0)
 
+    @property
+    def outside(self) -> int:
+        """Multipliers outside the unit circle."""
+        return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SteadyBranch:
@@ -119,6 +127,12 @@ class SteadyBranch:
         """Neighbouring points between which the contact signature changes."""
         pairs = zip(self.points, self.points[1:], strict=False)
         return tuple((one, other) for one, other in pairs if not one.contacts.same(other.contacts))
+
+    @property
+    def unlocated(self) -> tuple[tuple[BranchPoint, BranchPoint], ...]:
+        """Neighbouring points between which multipliers pass the unit circle and no point was found where they do."""
+        pairs = zip(self.points, self.points[1:], strict=False)
+        return tuple((a, b) for a, b in pairs if not (a.kind or b.kind) and a.outside != b.outside)
 
 
 class _Found:
@@ -379,14 +393,14 @@ def _crossings(at: Callable[[float], _Found], low: float, high: float) -> list[t
                 continue  # a multiplier passes 1 at a fold as well
             share = float(brentq(lambda share, k=k: at(share).signals[k], low, high, xtol=LOCATED, rtol=1e-12))
             more = _passed(at, share, low, high)
-            if more or k == 0:
+            if k == 0 or (more and np.min(np.abs(np.abs(at(share).multipliers) - 1.0)) < ON_CIRCLE):
                 found.append((share, k))
-            left -= more
+                left -= more
         if left and high - low > HALVED:
             middle = 0.5 * (low + high)
             return _crossings(at, low, middle) + _crossings(at, middle, high)
     except (SimulationError, ValueError):  # no point of the branch was found there; a sign that rounding changes
-        pass
+        return found  # what is left is among `SteadyBranch.unlocated`
     return found
 
 

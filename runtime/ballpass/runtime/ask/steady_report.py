@@ -86,6 +86,7 @@ def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange, resolut
     rows = []
     for branch in branches:
         listed = {id(one): other for one, other in branch.contact_changes[:LISTED]}
+        unlocated = {id(one): other for one, other in branch.unlocated}
         for k, point in enumerate(branch.points):
             what = point.kind or {0: "first point", len(branch.points) - 1: "last point"}.get(k)
             value = f"{point.value / over.factor:.9g}"
@@ -98,6 +99,9 @@ def branch_table(branches: Sequence[SteadyBranch], over: ParameterRange, resolut
             if id(point) in listed:
                 behind = f"{listed[id(point)].value / over.factor:.9g}"
                 rows.append((str(branch.repeats), f"{value} to {behind}", "contacts change", ""))
+            if id(point) in unlocated:
+                behind = f"{unlocated[id(point)].value / over.factor:.9g}"
+                rows.append((str(branch.repeats), f"{value} to {behind}", "stability changes, not located", ""))
     value = f"value, {printed_unit(over.shown_unit)}"
     return ReportTable(
         title=f"Branches over {over.name}",
@@ -147,7 +151,8 @@ def branch_facts(branch: SteadyBranch) -> dict[str, Any]:
                 "after": contact_facts(other.contacts),
             }
             for one, other in branch.contact_changes
-        ],
+        ]
+        + [{"kind": "stability changes", "between": [a.value, b.value]} for a, b in branch.unlocated],
         "points": [
             {
                 "value": point.value,
