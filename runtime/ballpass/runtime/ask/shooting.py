@@ -106,11 +106,11 @@ class Shooting:
     model: LoadedModel
     parameters: Mapping[str, float]
     period: ForcingPeriod
-    repeats: int
-    segments: int
+    repeats: int = 1
+    segments: int = 1
     magnitude: np.ndarray
-    rtol: float | None
-    over: str
+    rtol: float | None = None
+    over: str = ""
     parts: KeptParts
     progress: Callable[[float], None] | None = None
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -85,24 +86,14 @@ class Strobe:
         repeats = period_of(states, magnitude)
         if self.period is None or repeats == 1:
             return None
+        begun = Shooting(model=model, parameters=parameters, period=self.period, magnitude=magnitude, parts=parts)
         for period in range(1, repeats or min(LONGEST_SOUGHT, len(states) // 4) + 1):
             changes = changes_after(states, magnitude, period)
             third = max(len(changes) // 3, 1)
             if repeats % period or (not repeats and not np.max(changes[-third:]) < FALLS * np.max(changes[:third])):
                 continue
-            shooting = Shooting(
-                model=model,
-                parameters=parameters,
-                period=self.period,
-                repeats=period,
-                segments=1,
-                magnitude=magnitude,
-                rtol=None,
-                over="",
-                parts=parts,
-            )
             try:
-                found = shooting.solve(states[-1:])
+                found = replace(begun, repeats=period).solve(states[-1:])
             except SimulationError:
                 continue
             away = np.max(np.abs((states[::-period] - found.nodes[0]) / magnitude), axis=1)[::-1]
@@ -161,7 +152,7 @@ def strobe_of(
             run = sampled_turns(model, first)
             period = forcing_period(model, model.numbers(first), run.t, run.x, None)
         else:
-            period = common_period(model, parameters, over, lambda given: sampled_turns(model, given))
+            period = common_period(model, parameters, over, partial(sampled_turns, model))
     except RequestError:  # no common period: readings are taken each turn, and the report says so
         period = None
     if period is not None and period.time(values) <= LONGEST_STROBE * turn:

@@ -60,15 +60,10 @@ class VarianceShare:
         total_high = float(np.clip(total[1], 0.0, 1.0))
         first_low, first_high = np.clip(first, 0.0, total_high).tolist()
         total_low = float(np.clip(total[0], first_low, total_high))
-        return VarianceShare(
-            first=float(np.clip(self.first, first_low, first_high)),
-            first_low=first_low,
-            first_high=first_high,
-            total=float(np.clip(self.total, total_low, total_high)),
-            total_low=total_low,
-            total_high=total_high,
-            rows=self.rows,
-        )
+        first_now = float(np.clip(self.first, first_low, first_high))
+        total_now = float(np.clip(self.total, total_low, total_high))
+        numbers = (first_now, first_low, first_high, total_now, total_low, total_high)
+        return VarianceShare(**dict(zip(_NUMBERS, numbers, strict=True)), rows=self.rows)
 
 
 def variance_shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray, seed: int) -> tuple[VarianceShare, ...]:

@@ -43,6 +43,7 @@ class WorstValues:
 
     Attributes
     ----------
+    runs : of a point, one for each deviation
     decides : what decides the values beside the model, for parts that are kept
     sizes : of goal and limits, SI, known after `candidates`; below zero of a goal to make largest
     """
@@ -78,6 +79,7 @@ class WorstValues:
         self._signs = np.array([1.0, *(one.sign for one in limits)])
         self._offsets = np.array([0.0, *(one.limit for one in limits)])
         self._deviations = self._all_deviations()
+        self.runs = len(self._deviations)
         self._ways = np.array([-1.0 if largest else 1.0, *(1.0 for _ in limits)])
         self.decides = (largest, names, self._names, cycles, transient, parameters, OPTIMUM_RTOL, self._deviations)
         self.sizes = np.ones(len(self._columns))

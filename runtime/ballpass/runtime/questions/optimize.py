@@ -397,7 +397,7 @@ def optimize(
         warnings.simplefilter("ignore", KinkWarning)  # the search is made for kinks
         warnings.simplefilter("ignore", UnknownValueWarning)  # a candidate without values is none
         if tell is not None:
-            tell(f"{len(shares)} runs without derivatives", 0.0)
+            tell(f"{len(shares) * worst.runs} runs without derivatives", 0.0)
         merits = worst.candidates(shares, parts)
         begun = _valleys(shares, merits) if count == 1 else _apart(shares[np.argsort(merits, kind="stable")], starts)
         begun = begun[:starts]
