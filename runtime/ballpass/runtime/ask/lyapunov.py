@@ -41,6 +41,10 @@ WHOLE = 1e-9
 #: Smallest growth of which there is a logarithm [1].
 TINY = float(np.finfo(float).tiny)
 
+#: Half widths of the interval by which growth lies above zero where it is called chaos: that of 60 readings of a
+#: transient that ends on a periodic motion lies above zero by one to two.
+CERTAIN = 2.0
+
 #: Half an interval about zero that is short enough to say that nothing grows, per reading [1].
 NARROW = 0.02
 
@@ -65,6 +69,11 @@ class Exponent:
     @property
     def high(self) -> float:
         return self.mean + self.half
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether an interval of `CERTAIN` times its width lies above zero: growth on transients is not stationary."""
+        return self.mean > CERTAIN * self.half
 
 
 def largest_exponent(
@@ -197,7 +206,7 @@ def kind_of_motion(
     period = period_of(states, magnitude)
     if exponent is None:
         return (f"periodic {period}", "") if period else ("undecided", "the exponent, left out by --no-exponent")
-    if exponent.low > 0.0:
+    if exponent.chaotic:
         return "chaotic", ""
     if exponent.high < 0.0 and not forced:
         period = period or common_round(drifts)
@@ -207,4 +216,7 @@ def kind_of_motion(
         return (f"periodic {period}", "") if period else ("undecided", settling)
     if not period and exponent.half < NARROW:
         return "quasi-periodic", ""
-    return "undecided", "more --readings, for the interval of the exponent holds zero"
+    return (
+        "undecided",
+        "more --readings, for the interval of the exponent holds zero, or would if it were twice as wide",
+    )

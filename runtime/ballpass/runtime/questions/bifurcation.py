@@ -271,7 +271,7 @@ def bifurcation(
                 states, flows, magnitude = motion(given, start, settling)
                 drifts = strobe.drifts(model, given)
                 grown = largest_exponent(flows, states, magnitude, drifts) if exponent else None
-                if grown is None or grown.low <= 0.0:
+                if grown is None or not grown.chaotic:
                     settled = strobe.settled(model, given, states, magnitude, parts)
                     if settled is not None:  # readings that come to a periodic state are taken from there
                         states, flows, magnitude = motion(given, settled[1], 0)
