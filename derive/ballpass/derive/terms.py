@@ -40,6 +40,12 @@ class Definition:
     latex: str
 
 
+def defined(name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> Definition:
+    """``name := expression``."""
+    symbol = sp.Symbol(name, real=True)
+    return Definition(symbol=symbol, expression=expression, unit=unit, description=description, latex=latex)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
     """Names of a part's symbols: variables begin with `prefix`, constants and parameters with `path`.

@@ -53,6 +53,23 @@ def turned(
     return Input(name=name, symbol=symbol, kind=kind, unit=unit, description=description, latex=latex, turning=turning)
 
 
+def gate_of(
+    name: str, description: str, latex: str, turning: TurningInfo, windows: tuple[tuple[str, str], ...], parts: int = 1
+) -> Input:
+    """1 while a turning, modulo a turn over `parts`, lies in one of some windows, else 0."""
+    return Input(
+        name=name,
+        symbol=sp.Symbol(name, real=True),
+        kind="gate",
+        unit="1",
+        description=description,
+        latex=latex,
+        turning=turning,
+        windows=windows,
+        parts=parts,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateSwitch:
     """A place of the motion at which a load switches: the load acts where `function` is above `border`.

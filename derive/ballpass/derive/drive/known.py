@@ -15,8 +15,8 @@ import sympy as sp
 from ballpass.derive.drive.angle_state import driver_coordinate
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.scene.records import Driver, Shaft
-from ballpass.derive.terms import TIME, Definition, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Input, turned
+from ballpass.derive.terms import TIME, Definition, defined, symbol_of
+from ballpass.derive.variables import DRIVER_ANGLE, Input, gate_of, turned
 from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, TurningInfo
 
 
@@ -40,16 +40,8 @@ class KnownDrive(Drive):
 
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
         """An input."""
-        gate = Input(
-            name=f"gate.{name}",
-            symbol=sp.Symbol(f"gate.{name}", real=True),
-            kind="gate",
-            unit="1",
-            description=f"1 while {name} acts, else 0",
-            latex=rf"g_{{\mathrm{{{name}}}}}",
-            turning=self.turning,
-            windows=tuple(windows),
-        )
+        words, latex = f"1 while {name} acts, else 0", rf"g_{{\mathrm{{{name}}}}}"
+        gate = gate_of(f"gate.{name}", words, latex, self.turning, tuple(windows))
         return OverAngle(value=gate.symbol, inputs=(gate,))
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str], turns: int = 1) -> OverAngle:
@@ -105,13 +97,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
         latex=r"\alpha_1",
         turning=turning,
     )
-    speed = Definition(
-        symbol=sp.Symbol("driver.rate", real=True),
-        expression=rate.symbol + slope.symbol * TIME,
-        unit="rad/s",
-        description=f"Speed of {body}",
-        latex=r"\omega_1",
-    )
+    speed = defined("driver.rate", rate.symbol + slope.symbol * TIME, "rad/s", f"Speed of {body}", r"\omega_1")
     passed = (rate.symbol + slope.symbol * TIME / 2) * TIME
     whole = turned(turning, f"Angle of {body}, whole turns counted", r"\theta_{1,0}", "angle")
     passive = replace(driver_coordinate(), position=sp.Symbol("state.driver.angle", real=True)) if alone else None
@@ -138,13 +124,7 @@ def shaft_drive(shaft: Shaft, *, angle_used: bool) -> KnownDrive:
     ----------
     angle_used : whether a load follows it; balls know their own
     """
-    zero = Definition(
-        symbol=sp.Symbol("shaft.start_angle", real=True),
-        expression=sp.S.Zero,
-        unit="rad",
-        description="Angle of the shaft at t = 0",
-        latex=r"\theta_s",
-    )
+    zero = defined("shaft.start_angle", sp.S.Zero, "rad", "Angle of the shaft at t = 0", r"\theta_s")
     turning = TurningInfo(
         name="shaft",
         kind="driver",
@@ -186,6 +166,4 @@ def _at_constant_speed(
 
 
 def _angle(body: str, angle: sp.Symbol, start: Input, passed: sp.Expr, latex: str) -> Definition:
-    return Definition(
-        symbol=angle, expression=start.symbol + passed, unit="rad", description=f"Angle of {body}", latex=latex
-    )
+    return defined(angle.name, start.symbol + passed, "rad", f"Angle of {body}", latex)

@@ -31,7 +31,7 @@ from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
-from ballpass.derive.variables import Input
+from ballpass.derive.variables import Input, gate_of
 from ballpass.runtime.contract.manifest import TurningInfo
 
 if TYPE_CHECKING:
@@ -212,21 +212,10 @@ class _SpallContact:
 
     def gates(self, turnings: Mapping[str, TurningInfo]) -> tuple[Input, ...]:
         """One while a ball is within a part of the spall."""
-        prefix, on_ball = self.names.prefix, self.spall.on == "ball"
-        of = f" of {self.bearing.name}" if self.bearing.name else ""
+        on_ball, latex = self.spall.on == "ball", self.names.latex("g_d")
+        turning, parts = (turnings["spin"], 1) if on_ball else (turnings[self.ring], self.bearing.balls)
         return tuple(
-            Input(
-                name=f"gate.{prefix}defects.{self._label}{part}",
-                symbol=self._gate(part),
-                kind="gate",
-                unit="1",
-                description=f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}",
-                latex=self.names.latex("g_d"),
-                turning=turnings["spin" if on_ball else self.ring],
-                parts=1 if on_ball else self.bearing.balls,
-                windows=((self._symbol(begin).name, self._symbol(end).name),),
-            )
-            for part, begin, end in self._edges
+            gate_of(f"gate.{name}", words, latex, turning, (window,), parts) for name, words, window in self._windows
         )
 
     def switched(self, passes: Passing) -> Iterator[OverAngle]:
@@ -237,15 +226,17 @@ class _SpallContact:
         else:
             balls, seen = self.bearing.balls, passes.outer if self.ring == "outer" else passes.inner
             angle, rate = balls * seen[0], balls * seen[1]
+        for name, words, window in self._windows:
+            yield window_gate(name, words, self.names.latex("g_d"), angle=(angle, rate), windows=[window])
+
+    @property
+    def _windows(self) -> Iterator[tuple[str, str, tuple[str, str]]]:
+        """Name and words of each gate, and the edges of its window."""
         of = f" of {self.bearing.name}" if self.bearing.name else ""
         for part, begin, end in self._edges:
-            yield window_gate(
-                f"{self.names.prefix}defects.{self._label}{part}",
-                f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}",
-                self.names.latex("g_d"),
-                angle=(angle, rate),
-                windows=[(self._symbol(begin).name, self._symbol(end).name)],
-            )
+            words = f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}"
+            window = self._symbol(begin).name, self._symbol(end).name
+            yield f"{self.names.prefix}defects.{self._label}{part}", words, window
 
     def _gate(self, part: str) -> sp.Symbol:
         import sympy as sp

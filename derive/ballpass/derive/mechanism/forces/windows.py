@@ -17,7 +17,7 @@ from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import positive, quantity, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table, upright
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import defined
 from ballpass.runtime.contract.manifest import UsualInfo
 
 #: An angle of the driver.  Both edges of a window between zero and 2 pi degrees are probably meant in radians.
@@ -103,19 +103,15 @@ class Windows(Law):
         width = end - start - turn * sp.floor((end - start) / turn, evaluate=False)
         name, letter = f"gate.{force.name}", upright(force.name)
 
-        def constant(key: str, expression: sp.Expr, unit: str, words: str, latex: str) -> Definition:
-            symbol = sp.Symbol(f"{path}.{key}", real=True)
-            return Definition(symbol=symbol, expression=expression, unit=unit, description=words, latex=latex)
-
         words = f"Driver angle at which {force.name}"
         knots = (
-            constant("risen", start + rise, "rad", f"{words} has risen", rf"\theta_{{2,{letter}}}"),
-            constant("falls", start + width - rise, "rad", f"{words} begins to fall", rf"\theta_{{3,{letter}}}"),
-            constant("fallen", start + width, "rad", f"{words} has fallen", rf"\theta_{{4,{letter}}}"),
+            defined(f"{path}.risen", start + rise, "rad", f"{words} has risen", rf"\theta_{{2,{letter}}}"),
+            defined(f"{path}.falls", start + width - rise, "rad", f"{words} begins to fall", rf"\theta_{{3,{letter}}}"),
+            defined(f"{path}.fallen", start + width, "rad", f"{words} has fallen", rf"\theta_{{4,{letter}}}"),
         )
         heights = (
-            constant("none", sp.S.Zero, "1", f"Share of {force.name} outside its window", rf"g_{{0,{letter}}}"),
-            constant("full", sp.S.One, "1", f"Share of {force.name} inside its window", rf"g_{{1,{letter}}}"),
+            defined(f"{path}.none", sp.S.Zero, "1", f"Share of {force.name} outside its window", rf"g_{{0,{letter}}}"),
+            defined(f"{path}.full", sp.S.One, "1", f"Share of {force.name} inside its window", rf"g_{{1,{letter}}}"),
         )
         none, full = (one.symbol.name for one in heights)
         angles = [window.start.path, *(one.symbol.name for one in knots)]
