@@ -1,7 +1,8 @@
 """A JSON Schema of the scene file, by which editors complete and check it.
 
-In: the declared keys.  Out: a schema (draft 2020-12) of the tables, their keys and the allowed values.  It has no
-rules across keys: a file that it accepts may have faults that are found only when the file is read.
+In: the declared keys.  Out: a schema (draft 2020-12) of the tables, their keys and the allowed values.  Of rules across
+keys it has which of them are given (`Either`) and what a law or type decides: a file that it accepts may have faults
+that are found only when the file is read.
 """
 
 from __future__ import annotations
