@@ -529,10 +529,6 @@ def _passages(a: Asked) -> Any:
     return a.model.passages(2, transient=0, parameters=a.numbers)
 
 
-def _growth(a: Asked) -> Any:
-    return a.model.growth(4, transient=2, parameters=a.numbers).uncertain
-
-
 def _explained(a: Asked) -> Any:
     return plain(a.model.explain(a.numbers).report())
 
@@ -582,7 +578,6 @@ OTHERS: Mapping[str, Callable[[Asked], Any]] = {
     "reductions": _reductions,
     "settle": _settled,
     "passages": _passages,
-    "growth": _growth,
     "explain": _explained,
     "members": _members,
     "figures": _figures,
@@ -656,7 +651,7 @@ def asked(twin: Twin, machine: Machine, model: Model) -> Asked:
 #: Facts that are no numbers of the machine: what it took, and by how much estimates may be off.
 EFFORT = re.compile(
     "steps|seconds|wall_time|signature|evaluations|iterations|members|folder|files|certificate|uncertainty|"
-    "disagreement|growth/value|change|_low|_high|/left|/difference|/margin|/route"
+    "disagreement|change|_low|_high|/left|/difference|/margin|/route"
 )
 _DIGITS = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
 

@@ -96,7 +96,7 @@ def test_samples_and_quantities_are_those_of_the_closed_form(still: Model) -> No
 def test_members_are_those_of_the_closed_form(still: Model) -> None:
     """`simulate_many` needed at least one array to concatenate."""
     speeds = [20.0, 60.0, 110.0]
-    many = still.simulate_many({SPEED: speeds}, ["max:drive_torque", "drive_work"], growth=True, kinks="located")
+    many = still.simulate_many({SPEED: speeds}, ["max:drive_torque", "drive_work"], uncertainty=True, kinks="located")
     assert many.failures == ()
     assert many["max:drive_torque"] == pytest.approx([peak(speed) for speed in speeds], rel=1e-7)
     assert np.ptp(many["drive_work"]) < 1e-9

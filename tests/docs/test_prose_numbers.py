@@ -329,9 +329,10 @@ NAMED: dict[str, dict[str, str]] = {
         "below about 1e-9": "an observation, which a status of the run repeats",
     },
     "docs/reference/cli.md": {
-        "up to 3e-7, up to 1e-6 where": "locating.py",
+        "up to 1e-6, and at any": "locating.py",
+        "up to 3e-7, and 1e-6 where": "locating.py",
+        "by more than 0.1 %": "report/digits.py",
         "up to 64 steady turns or 100 000 steps": "settle.py",
-        "over 20 such starts": "certify/growth.py",
         "from 64 on": "settle.py",
         "At 4096 turns": "settle.py",
         "from 64 steady ones on": "settle.py",

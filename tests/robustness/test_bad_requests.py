@@ -232,7 +232,10 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: m.simulate_many(MANY, 5, cycles=0.1), "observables: one name or several"),
     (lambda m: m.simulate_many(MANY, ["peak_ball_force"], cycles="3"), "cycles: a number above 0 is expected, not '3'"),
     (lambda m: m.simulate_many(MANY, ["peak_ball_force"], client=5), "client: a Client of dask.distributed"),
-    (lambda m: m.simulate_many(MANY, [], growth=np.zeros(3)), r"growth: True or False is expected, not array"),
+    (
+        lambda m: m.simulate_many(MANY, [], uncertainty=np.zeros(3)),
+        r"uncertainty: True or False is expected, not array",
+    ),
     (lambda m: m.refine_peak(5, "ball.force"), "solution: a solution of a run is expected"),
     (lambda m: m.refine_peak(m.simulate(0.1), "ball.force", kind=[]), r"kind: 'max' or 'min' is expected, not \[\]"),
     (
@@ -280,7 +283,10 @@ WRONG_TYPES: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: m.optimize("drive_work", "bearing.clearance=1um:3um", keep=5), "keep: a path is expected, not 5"),
     (lambda m: m.spectrum("inner.x", cycles=2, sensor=5), r"sensor: a sensor is expected, not 5 \(int\)"),
     (lambda m: m.settle(transient="a"), "transient"),
-    (lambda m: m.growth(0.1, progress=np.zeros(3)), r"progress: a function that takes .*, not array.* \(ndarray\)"),
+    (
+        lambda m: m.uncertainties([], 0.1, progress=np.zeros(3)),
+        r"progress: a function that takes .*, not array.* \(ndarray\)",
+    ),
     (lambda m: m.sensitivity("drive_work", cycles=0.1, progress=5), "progress: a function that takes .*, not 5 "),
     (lambda m: m.reduce(1, kinks=np.zeros(2)), "no choice of kinks array"),
     (lambda m: m.steady(parameters=5), r"parameters: a mapping from name to value is expected, not 5 \(int\)"),
@@ -368,13 +374,6 @@ def test_what_a_run_within_its_transient_is_told_to_do_can_be_done(model: Model)
 
 def test_a_function_of_no_name_is_none_that_a_model_has(model: Model) -> None:
     assert [model.has(name) for name in ("rhs", "a", [], 5)] == [True, False, False, False]
-
-
-def test_growth_of_a_model_without_states_is_refused(tmp_path: Path) -> None:
-    linkage = PRESS.partition("[bearing]")[0]
-    still = load(generate(scene_from_text(linkage, "linkage"), tmp_path / "linkage"))
-    with pytest.raises(RequestError, match="growth: this scene has no states"):
-        still.growth(1)
 
 
 def test_names_may_be_given_in_any_kind_of_sequence(model: Model) -> None:

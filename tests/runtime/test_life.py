@@ -39,7 +39,7 @@ def by_samples(model: Model, cycles: int) -> float:
 def test_a_life_is_that_of_fine_samples(make_model: Callable[..., Model], scene: str, cycles: int) -> None:
     model = make_model(scene)
     table = {"bearing.clearance": [model.parameters["bearing.clearance"]]}
-    found = model.simulate_many(table, ["life"], cycles=cycles, transient=1, rtol=1e-8, growth=False)
+    found = model.simulate_many(table, ["life"], cycles=cycles, transient=1, rtol=1e-8)
     # bins and hat functions smear a field alike only in the limit
     assert float(found["life"][0]) == pytest.approx(by_samples(model, cycles), rel=5e-3)
 
@@ -51,7 +51,7 @@ def test_under_a_load_that_stands_a_life_is_that_of_iso_16281_whichever_ring_tur
     """With the rings the wrong way round the life is a tenth longer."""
     model = make_model("varying_compliance", ("[shaft]\n", f'[shaft]\nring = "{ring}"\n'))
     span = {"cycles": 40, "transient": 2, "rtol": 1e-6}
-    found = model.simulate_many({"bearing.clearance": [0.0]}, ["life"], growth=False, **span)  # type: ignore[arg-type]
+    found = model.simulate_many({"bearing.clearance": [0.0]}, ["life"], **span)  # type: ignore[arg-type]
     (report,) = model.life(parameters={"bearing.clearance": 0.0}, **span).bearings  # type: ignore[arg-type]
     assert (report.speed < 0.0) is (ring == "outer")  # of the inner ring against the outer one
     assert float(found["life"][0]) == pytest.approx(report.life, rel=1e-3)
@@ -72,7 +72,7 @@ def by_means(model: Model, turning: str) -> float:
 def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press")
     clearances = [8e-6, 10e-6, 12e-6]
-    run = {"cycles": 4, "transient": 2, "rtol": 1e-8, "growth": False, "kinks": "stepped-over"}
+    run = {"cycles": 4, "transient": 2, "rtol": 1e-8, "kinks": "stepped-over"}
     lanes, single = (
         model.simulate_many({"bearing.clearance": clearances}, ["life"], lanes=lanes, **run) for lanes in (True, False)
     )
@@ -87,7 +87,7 @@ def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[...
 def test_the_bearing_of_several_is_named(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press_hinges")
     names = ["main.life", "big_end.life"]  # the pin swings
-    found = model.simulate_many({"mechanism.gravity": [9.81]}, names, cycles=2, transient=1, growth=False)
+    found = model.simulate_many({"mechanism.gravity": [9.81]}, names, cycles=2, transient=1)
     assert all(1e4 < float(found[name][0]) < 1e12 for name in names)
     with pytest.raises(RequestError, match=r"life is of a bearing. Write main.life or"):
         model.sensitivity(of=["life:inner.x"], wrt=["mechanism.gravity"])
@@ -105,7 +105,7 @@ def test_derivatives_of_life_are_verified_and_those_of_differences(make_model: C
     for name in names:
         at = model.parameters[name]
         steps = at * np.array([-6e-4, -3e-4, 3e-4, 6e-4])
-        run = {"cycles": 6, "transient": 2, "rtol": 1e-10, "kinks": "located", "growth": False}
+        run = {"cycles": 6, "transient": 2, "rtol": 1e-10, "kinks": "located"}
         found = np.asarray(model.simulate_many({name: at + steps}, ["life"], **run)["life"])
         far, near = (float(found[k] - found[3 - k]) / (steps[k] - steps[3 - k]) for k in (0, 1))
         slope, allowed = (4 * near - far) / 3, 2e-4 * float(np.mean(found)) / at

@@ -92,7 +92,7 @@ def reports(make_model: Callable[..., Model]) -> dict[str, Any]:
     return by_class(
         *(life, life.states[0], life.bearings[0], life.bearings[0].inner, trade, trade.measured[0]),
         *(sensitivity, sensitivity.pairs[0], many, many.statistics, model.sensitivities(CLEARANCE, 1)),
-        *(exact, exact.accuracy, model.settle(), model.growth(3)),
+        *(exact, exact.accuracy, model.settle()),
         QuantityFunction(model, "rms:inner.y", [CLEARANCE], cycles=3),
     )
 

@@ -174,16 +174,9 @@ def test_an_interrupt_between_the_runs_of_a_call_is_no_result(press: Model, monk
     calls.clear()
     monkeypatch.setattr(ensemble, "run_chunks", interrupted)
     table = {"bearing.clearance": [5e-6, 8e-6]}
-    found = press.simulate_many(table, "rms:inner.y", cycles=1, transient=0.5, growth=True)
+    found = press.simulate_many(table, "rms:inner.y", cycles=1, transient=0.5, uncertainty=True)
     assert found.interrupted
     assert len(calls) == 2
-
-
-def test_growth_tells_how_far_both_runs_are(rotor: Model) -> None:
-    told: list[float] = []
-    rotor.growth(cycles=3, transient=1, progress=told.append)
-    assert told == sorted(told)
-    assert (told[0], told[-1]) == (0.5, 1.0)
 
 
 def test_a_bar_changes_no_bit(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
-from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
+from ballpass.runtime.certify.member_digits import simulate_members
 from ballpass.runtime.certify.transient import find_transient
 from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
@@ -31,6 +31,7 @@ from ballpass.runtime.point.run_start import Initial, start_of
 from ballpass.runtime.quantity.passages import passing_times
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.questions import Questions
+from ballpass.runtime.report.digits import SCATTER, further, uncertainty
 from ballpass.runtime.run.choose_method import method_names
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
@@ -214,8 +215,8 @@ class Model(PointModel, Questions):
             motion continue (``end.x``, its state alone, begins at t = 0).  Default: the scene's
         transient : turns from t = 0 on that `Solution.steady` leaves out, also where the run continues another one
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
-            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
-            (1e-6 where a law jumps), else stepped over
+            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 1e-6,
+            else stepped over
         progress : called with the finished fraction.  Default: a bar on a terminal or in a notebook, from the first
             second on; False for none.  With BALLPASS_PROGRESS=0 in the environment there is one only for True
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
@@ -537,7 +538,7 @@ class Model(PointModel, Questions):
         kinks: Kinks | None = None,
         threads: int | None = None,
         lanes: bool = True,
-        growth: bool = False,
+        uncertainty: bool = False,
         client: Any = None,
         progress: Progress = None,
     ) -> EnsembleResult:
@@ -558,14 +559,14 @@ class Model(PointModel, Questions):
         transient : turns at the start that do not count
         rtol : error allowed per step, relative to each member's own magnitudes
         method : ``auto``, or one of the project's own stepper
-        kinks : as in `simulate`: with ``located``, the default at tight tolerances of ``auto`` and ``stepper``, steps
-            end on the kinks of the laws and members run one at a time, because lanes cannot locate kinks; with
-            ``stepped-over`` they run in lanes at any tolerance, but the error of a step at a kink exceeds a tight one,
-            and members agree with single runs only within that error.  ``statistics.kinks`` has the choice
+        kinks : as in `simulate`: with ``located``, the default of ``auto`` and ``stepper`` at rtol up to 3e-7 (1e-6
+            where a law jumps), steps end on the kinks of the laws and members run one at a time, because lanes cannot;
+            with ``stepped-over`` they run in lanes at any tolerance, but the error of a step at a kink exceeds a tight
+            one, and members agree with single runs only within that error.  ``statistics.kinks`` has the choice
         threads : default: as many as processors
         lanes : False advances one member at a time
-        growth : run each member a second time from a start moved by the tolerance; ``uncertain`` of the result then
-            names the numbers without digits (see `growth`)
+        uncertainty : run each member at a tighter tolerance as well, and at more of them where its numbers scatter;
+            ``uncertainty`` of the result then has the ± of each number
         client : of `dask.distributed`; its workers simulate parts of the table, in lanes, with the same bits where they
             have the same processor and compiler.  ``threads`` are then those of the cluster
         progress : as for `simulate`
@@ -587,16 +588,14 @@ class Model(PointModel, Questions):
 
         def run(
             table: Table,
-            names: str | Sequence[str],
             rtol: float | None = rtol,
-            method: str | None = method,
             kinks: str | None = kinks,
         ) -> EnsembleResult:
             where = {"threads": threads} if client is None else {"client": client}
             return (simulate_many if client is None else simulate_parts)(
                 self,
                 table,
-                names,
+                observables,
                 cycles=cycles,
                 duration=duration,
                 transient=transient,
@@ -609,42 +608,62 @@ class Model(PointModel, Questions):
             )
 
         with shown("simulating members", progress) as tell:
-            return simulate_members(self, parameters, observables, run) if growth else run(parameters, observables)
+            return simulate_members(parameters, run) if uncertainty else run(parameters)
 
-    def growth(
+    def uncertainties(
         self,
+        of: str | Sequence[str],
         cycles: float | None = None,
         *,
         duration: float | None = None,
         transient: float | None = None,
         parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
         rtol: float | None = None,
         initial: Initial = None,
-        of: str | Sequence[str] | None = None,
+        kinks: Kinks | None = None,
         progress: Progress = None,
-    ) -> Growth:
-        """Change of the extremes of a run when its start moves by the tolerance; see `ballpass.runtime.certify.growth`.
+    ) -> dict[str, float]:
+        """± of the values of `quantities`, from runs at tighter tolerances: one, and more where the values scatter.
 
-        Takes two runs of the stepper, without samples.  Parameters are those of `simulate`; of a motion that grows,
-        quantities in `of` get mean and deviation over moved starts.
+        Parameters are those of `quantities`.
 
         Raises
         ------
         RequestError
-            A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
+            As for `quantities`.
         SimulationError
-            The computation failed.
+            A computation failed.
 
         Examples
         --------
-        >>> found = model.growth(cycles=4, transient=2)
-        >>> found.uncertain, found.worst < 1e-3
-        ((), True)
+        >>> found = model.uncertainties(["drive_work", "peak_ball_force"], cycles=3, transient=2)
+        >>> found["drive_work"], found["peak_ball_force"] < 0.1  # [J], [N]
+        (0.0, True)
         """
-        numbers, request = self._asked(parameters, initial, transient, cycles=cycles, duration=duration, rtol=rtol)
-        with shown("simulating from two starts", progress) as tell:
-            names = dict.fromkeys([of] if isinstance(of, str) else of or ())
-            return find_growth(self, numbers, replace(request, progress=tell), of=tuple(names))
+
+        def ask(tighter: float | None) -> list[float]:
+            found = self.quantities(
+                of,
+                cycles,
+                duration=duration,
+                transient=transient,
+                parameters=parameters,
+                method=method,
+                rtol=rtol if tighter is None else tighter,
+                initial=initial,
+                kinks=kinks,
+                progress=progress,
+            )
+            return [one.value for one in found.values()]
+
+        asked = self.run_settings.rtol if rtol is None else rtol
+
+        def scattered(two: Sequence[list[float]]) -> bool:
+            return any(uncertainty(pair) > SCATTER * abs(pair[0]) for pair in zip(*two, strict=True))
+
+        every = zip(*further(ask(None), ask, asked, scattered), strict=True)
+        return dict(zip([of] if isinstance(of, str) else of, map(uncertainty, every), strict=True))
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

@@ -13,7 +13,7 @@ import math
 import platform
 import warnings
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -46,7 +46,6 @@ from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.ask.observables import SignalStatistics
-    from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.reductions import Reduction
     from ballpass.runtime.run.settle import Settled
@@ -62,13 +61,8 @@ _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 SHOWN = 5
 
 
-def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict[str, Any]:
+def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     """Key numbers of a run.
-
-    Parameters
-    ----------
-    growth : of perturbations, where it was computed; numbers of a motion that amplifies them then get the mean and
-        the standard deviation over moved starts (``over_starts``)
 
     Returns
     -------
@@ -111,18 +105,13 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     summary |= _paths(steady)
     summary |= _motions(steady)
     summary |= _constants(steady)
-    if growth is not None:
-        summary["growth"] = _numbers("growth", "1", value=growth.worst, moved=growth.moved)
-        for name in dict.fromkeys(channel for _, channel in growth.spread):
-            _add_spread(summary, growth, name)
     summary["versions"] = _versions(steady)
     found = _unusual(steady)
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
-    grown = [growth.words] if growth is not None and growth.words else []
     values = model.numbers(sol.parameters).values
     summary["limits"] = list(limits_of_model(manifest, values))
-    summary["warnings"] = [*unusual(manifest, values), *found, *grown]
+    summary["warnings"] = [*unusual(manifest, values), *found]
     return summary
 
 
@@ -142,20 +131,56 @@ def _unusual(sol: Solution) -> list[str]:
     return said
 
 
-def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, instead: bool) -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turned:
+    """What is said of more turns than those of a run.
+
+    Attributes
+    ----------
+    turns : how many
+    rows : entries of the summary and their numbers, and whether four digits are as before
+    settled : whether no more turns change a number
+    """
+
+    turns: int
+    rows: tuple[tuple[str, str, bool], ...]
+    settled: bool
+
+    def words(self, summary: Mapping[str, Any], manifest: Manifest) -> str:
+        """A sentence: which results change, over how many turns."""
+        said = []
+        for entry, kind, same in self.rows[:SHOWN]:
+            factor, shown = table_unit(summary[entry]["unit"])
+            now, before = (rounded(factor * of[entry][kind]) for of in (summary["longer"], summary))
+            row = f"{entry}.{kind}" if kind in _BALL_FORCES else entry
+            words = inside(row_words(manifest, row)) + ("" if kind in _BALL_FORCES else f", {kind}")
+            said.append(f"{words} {now} {shown} {'as before' if same else f'instead of {before}'}")
+        if self.settled:
+            said.append(
+                f"peaks change by at most {100.0 * PEAKS:g} % of their range, rms by at most {100.0 * MEANS:g} %."
+            )
+            return f"Over {self.turns} steady turns: {'; '.join(said)}"
+        more = f"; and {len(self.rows) - SHOWN} more (summary.json)" if len(self.rows) > SHOWN else ""
+        return f"Over {self.turns} steady turns: {'; '.join(said)}{more}. --turns settle runs until they settle."
+
+
+def add_turns(
+    summary: dict[str, Any], longer: Settled, manifest: Manifest, like: Turned | None = None, *, instead: bool
+) -> tuple[str, Turned]:
     """Add the results of more turns to a summary (``longer``).
 
     Parameters
     ----------
     longer : extremes and rms over more turns than the run's
+    like : what is said of an answer that this is compared with
     instead : replace those of the run by them
 
     Returns
     -------
-    A sentence: which results change, over how many turns.
+    A sentence, and what it says.
     """
     added: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
-    lines: list[tuple[bool, float, str]] = []
+    changed: list[tuple[bool, float, tuple[str, str, bool]]] = []
     for name, found in longer.reductions.items():
         entry, numbers = _printed(name, found)
         if entry not in summary:
@@ -165,23 +190,19 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
             continue
         unit, (peak, mean) = summary[entry]["unit"], longer.changes.get(name, (0.0, 0.0))
         added[entry] = added.get(entry, {}) | _numbers(entry, unit, **numbers)
-        factor, shown = table_unit(unit)
+        factor, _ = table_unit(unit)
         for kind, value in numbers.items():
             before = summary[entry][kind]
             # the highest force comes first, changed or not
             change = math.inf if kind == "total" else abs(value - before) / max(abs(before), abs(value), 1e-300)
             counts = (kind in ("min", "max") and peak > PEAKS) or (kind == "rms" and mean > MEANS)
             if change == math.inf or (counts and change > PEAKS):
-                now, first = (rounded(factor * number) for number in (value, before))
-                than = f"instead of {first}" if now != first else "as before"
                 row = f"{entry}.{kind}" if kind in _BALL_FORCES else entry
-                words = inside(row_words(manifest, row)) + ("" if kind in _BALL_FORCES else f", {kind}")
+                same = rounded(factor * value) == rounded(factor * before)
                 # rows of the table before those that it leaves out
-                lines.append((row_place(manifest, row) is None, -change, f"{words} {now} {shown} {than}"))
+                changed.append((row_place(manifest, row) is None, -change, (entry, kind, same)))
         if instead:
             summary[entry] |= added[entry]
-            if not longer.settled:
-                summary[entry].pop("over_starts", None)  # of other turns
             for key in numbers.keys() & _BALL_FORCES.keys():
                 summary[entry]["time"][key], summary[entry]["ball"][key] = found.maximum_time, found.maximum_ball
                 summary[entry]["sampled"].pop(key)
@@ -196,14 +217,13 @@ def add_turns(summary: dict[str, Any], longer: Settled, manifest: Manifest, *, i
     if instead:
         summary["steady_cycles"] = added["turns"]
         words = longer.words_of(lambda name: inside(row_words(manifest, name)))
-        return f"{words}. Samples and figures are those of the first turns."
-    over = f"Over {longer.turns} steady turns"
-    lines.sort(key=lambda line: line[:2])
-    if longer.settled:
-        rest = f"peaks change by at most {100.0 * PEAKS:g} % of their range, rms by at most {100.0 * MEANS:g} %."
-        return f"{over}: {'; '.join([*(text for _, change, text in lines if change == -math.inf), rest])}"
-    more = f"; and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
-    return f"{over}: {'; '.join(text for *_, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
+        said = f"{words}. Samples and figures are those of the first turns."
+        return said, Turned(turns=longer.turns, rows=(), settled=longer.settled)
+    if like is None:
+        changed.sort(key=lambda line: line[:2])
+        rows = [row for _, change, row in changed if change == -math.inf or not longer.settled]
+        like = Turned(turns=longer.turns, rows=tuple(rows), settled=longer.settled)
+    return like.words(summary, manifest), like
 
 
 def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
@@ -218,21 +238,6 @@ def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
 
 def _moments(of: Reduction | SignalStatistics) -> dict[str, float]:
     return {"min": of.minimum, "max": of.maximum, "mean": of.mean, "rms": of.rms, "std": of.std}
-
-
-def _add_spread(summary: dict[str, Any], growth: Growth, name: str) -> None:
-    """Mean and standard deviation over moved starts, beside the numbers of a channel."""
-    prefix, of_ball, force = name.rpartition("ball.")
-    keys = {kind: kind for kind in ("min", "max", "rms")}
-    entry = summary.get(name)
-    if of_ball:
-        key = {path: key for key, path in _BALL_FORCES.items()}.get(f"ball.{force}")
-        entry, keys = summary.get(f"{prefix}peak_ball_force"), {"max": key} if key is not None else {}
-    for kind, key in keys.items():
-        if entry is not None and key in entry:
-            mean, deviation = growth.spread[kind, name]
-            spread = _numbers(name, entry["unit"], mean=mean, std=deviation)
-            entry.setdefault("over_starts", {})[key] = spread
 
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:

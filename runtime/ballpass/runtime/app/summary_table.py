@@ -38,7 +38,6 @@ _RUN = {
     "transient_cycles_dropped": "transient turns left out: {}",
     "steady_cycles": "steady turns: {}",
     "samples": "their samples: {}",
-    "growth": "a start moved by the tolerance changes results by {}",
 }
 
 #: Those that say nothing where nothing is integrated.
@@ -92,7 +91,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
         rows=[row for _, row in rows],
         right=columns,
         wrapped=("",),
-        caption=_caption(summary, every=every, uncertain=any("±" in cell for _, cells in rows for cell in cells)),
+        caption=_caption(summary, every=every),
     )
     return table, left_out
 
@@ -114,13 +113,11 @@ def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -
         return ""
     if abs(item[key]) < dust:
         return "0"
-    return written(item, key, factor, "\n")  # ± below it: three of these fill a line
+    return written(item, key, factor)
 
 
-def _of_run(key: str, value: float) -> str:
-    """A number about the run: a count whole, a change in per cent, others with four digits."""
-    if key == "growth":
-        return f"{rounded(100.0 * value, 2)} %"
+def _of_run(value: float) -> str:
+    """A number about the run: a count whole, others with four digits."""
     return str(value) if isinstance(value, int) else rounded(value)
 
 
@@ -132,8 +129,7 @@ def render_quantities(manifest: Manifest, found: Mapping[str, Mapping[str, Any]]
         time = "" if one["time"] is None else f"t = {one['time']:.6g} s"
         channel = parse_quantity(manifest, name).channel
         ball = "" if one["ball"] is None else bearing_words(f"ball {one['ball']}", manifest.bearings, channel)
-        value = written(one, "value", factor, " ") if "over_starts" in one else f"{factor * one['value']:z.6g}"
-        rows.append((name, value, unit, ", ".join(filter(None, [time, ball]))))
+        rows.append((name, f"{factor * one['value']:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
     heads = ("quantity", "value", "unit", "at")
     caption = _quantities_words(manifest, {name: one["value"] for name, one in found.items()})
     return ReportTable(title="Quantities", heads=heads, rows=rows, right=("value",), caption=caption)
@@ -169,10 +165,10 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
     )
 
 
-def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str:
+def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
     still = summary["method"] == NOT_INTEGRATED
     run = [
-        words.format(_of_run(key, summary[key]["value"]))
+        words.format(_of_run(summary[key]["value"]))
         for key, words in _RUN.items()
         if key in summary and summary[key]["value"] is not None and not (still and key in _INTEGRATION)
     ]
@@ -184,8 +180,6 @@ def _caption(summary: Mapping[str, Any], *, every: bool, uncertain: bool) -> str
     alike = len(set(laws.values())) == 1
     each = [next(iter(laws.values()))] if alike else [f"{law} in {bearing}" for bearing, law in laws.items()]
     law = [f"damping law {', '.join(each)}"] if laws else []
-    if uncertain:
-        law.append("± twice the standard deviation over moved starts, or the distance from their mean")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
     sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []

@@ -60,25 +60,10 @@ def row_words(manifest: Manifest, name: str) -> str:
     return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
 
 
-def written(item: Mapping[str, Any], key: str, factor: float, between: str) -> str:
-    """A number of the summary with four digits, or with those that hold over moved starts, and its uncertainty.
-
-    That is twice the standard deviation over moved starts, or the distance of the number from their mean if they are of
-    the same turns.  A number of the samples alone, without an uncertainty, has a star: more samples may show more.
-
-    Parameters
-    ----------
-    between : number and uncertainty
-    """
-    value, spread = item[key], item.get("over_starts", {}).get(key)
+def written(item: Mapping[str, Any], key: str, factor: float) -> str:
+    """A number of the summary; one of the samples alone has a star: more samples may show more."""
     star = "*" if item.get("searched", {}).get(key) == "samples" else ""
-    if spread is None or value == 0.0:
-        return rounded(factor * value) + star
-    apart = max(2.0 * spread["std"], abs(value - spread.get("mean", value)))
-    if apart < 5e-5 * abs(value):  # all of four
-        return rounded(factor * value) + star
-    digits = min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(apart)) + 1, 1), 4)
-    return f"{rounded(factor * value, digits)}{between}±{rounded(factor * apart, 1)}"
+    return f"{rounded(factor * item[key])}{star}"
 
 
 def inside(words: str) -> str:
@@ -120,7 +105,7 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
         if pressure > element.static_pressure:
             beyond.append(element)
         whose = f" of {bearing.name}" if bearing.name else ""
-        number = written(peak, "total", 1.0, " ")
+        number = written(peak, "total", 1.0)
         said.append(
             f"Highest {element.noun} force{whose}: {number} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} "
             "raceway."

@@ -100,8 +100,7 @@ class EnsembleResult(Reported, Mapping[str, np.ndarray]):
     interrupted : whether the run was stopped by the user; members finished by then have results
     statistics : its cost
     manifest : of the model
-    uncertain : where growth was asked for: by observable, members whose value the tolerance does not determine, each of
-        shape (members,)
+    uncertainty : where it was asked for: ± of each observable, shape (members,)
 
     Examples
     --------
@@ -119,7 +118,7 @@ class EnsembleResult(Reported, Mapping[str, np.ndarray]):
     interrupted: bool
     statistics: EnsembleStatistics
     manifest: Manifest = field(repr=False)
-    uncertain: Mapping[str, np.ndarray] = field(default_factory=dict)
+    uncertainty: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         count = len(next(iter(self.parameters.values())))
@@ -231,7 +230,7 @@ def simulate_many(
     chosen = _quantities(model, observables)
     chosen_method, _ = choose_method(model, method or manifest.run.method, stepper=True)
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
-    at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance)
+    at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance, lanes=True)
     workers = _threads(threads)
     # the table first: a wrong one is reported before the driver is compiled
     columns = read_table(manifest, table)

@@ -53,7 +53,7 @@ def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, f
             yield f"pressure{ending}", _pressure(model, info, bearing, numbers, title)
 
 
-@Question(figures=life_figures, steady=True, requires="bearings")
+@Question(figures=life_figures, steady=True, requires="bearings", digits=True)
 def life(
     model: PointModel,
     cycles: Cycles = None,

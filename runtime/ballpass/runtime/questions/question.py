@@ -46,6 +46,7 @@ class Question:
     steady : whether its numbers are those of the steady machine, so that what is not is warned of; where it finds
         parameters itself, a function of the answer that gives them
     requires : what a scene must have for an answer: ``"states"`` or ``"bearings"``; empty for nothing
+    digits : whether the command asks at a tighter tolerance as well, and prints the digits that both bear
     always : whether figures are drawn into the folder of the results unless they are turned off; otherwise figures and
         ``<name>.json`` are written where a folder is given
     """
@@ -60,6 +61,7 @@ class Question:
     takes_runs: bool = False
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
     requires: Literal["", "states", "bearings"] = ""
+    digits: bool = False
     always: bool = False
     steady: bool | Callable[[Any], Mapping[str, float]] = False
 

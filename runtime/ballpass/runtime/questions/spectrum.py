@@ -332,7 +332,16 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     yield "spectrum", figure
 
 
-@Question(stage="spectrum", samples=True, needs="scipy", check=_check, figures=_figures, always=True, takes_runs=True)
+@Question(
+    stage="spectrum",
+    samples=True,
+    needs="scipy",
+    check=_check,
+    figures=_figures,
+    always=True,
+    takes_runs=True,
+    digits=True,
+)
 def spectrum(
     model: AnyModel,
     of: Of = None,

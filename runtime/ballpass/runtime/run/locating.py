@@ -23,9 +23,12 @@ STEPPED_OVER: Kinks = "stepped-over"
 LOCATED: Kinks = "located"
 CHOICES: tuple[Kinks, ...] = (STEPPED_OVER, LOCATED)
 
-#: Tolerances from which on the stepper locates kinks by default: there it takes less time to an equal error.  First
-#: where the motion has kinks, then where a law jumps [1].
-TIGHT, TIGHT_JUMPS = 3e-7, 1e-6
+#: Tolerance from which on the stepper locates kinks by default: that of a scene without one.  Stepped over,
+#: extremes are off by ten times as much [1].
+TIGHT = 1e-6
+
+#: The same of ensembles, whose lanes cannot: first where the motion has kinks, then where a law jumps [1].
+TIGHT_LANES, TIGHT_JUMPS = 3e-7, 1e-6
 
 #: The same where loads act within windows of an angle that is a state: any tolerance [1].
 ALWAYS = 1.0
@@ -57,7 +60,7 @@ def has_kinks(manifest: Manifest) -> bool:
     return written or any(word != "twice smooth" for word in elastic)
 
 
-def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float) -> Kinks:
+def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float, *, lanes: bool = False) -> Kinks:
     """Choice of a run at kinks.
 
     Parameters
@@ -65,6 +68,7 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
     asked : one of `CHOICES`, None for the default
     method : name of the method that runs
     rtol : its tolerance [1]
+    lanes : of an ensemble
 
     Returns
     -------
@@ -78,16 +82,18 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
         Another word, or kinks are to be located by a method that cannot.
     """
     if asked is None:
-        tight = rtol <= tight_below(manifest) and has_kinks(manifest)
+        tight = rtol <= tight_below(manifest, lanes=lanes) and has_kinks(manifest)
         return LOCATED if tight and (method == "stepper" or (manifest.borders and method in STEPPERS)) else STEPPED_OVER
     return check_located(asked, method)
 
 
-def tight_below(manifest: Manifest) -> float:
+def tight_below(manifest: Manifest, *, lanes: bool = False) -> float:
     """Tolerance from which on `stepper` locates kinks by default [1]."""
     if manifest.borders:
         return ALWAYS
-    return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
+    if not lanes:
+        return TIGHT
+    return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT_LANES
 
 
 def check_located(asked: str, method: str) -> Kinks:

@@ -141,8 +141,12 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
             before = found
 
 
-def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
+def look_further(model: LoadedModel, numbers: Numbers, solution: Solution, turns: int | None = None) -> Settled | None:
     """`look_beyond` of a run that is done; None where another method than the project's own stepper ran.
+
+    Parameters
+    ----------
+    turns : in place of those that `STEPS` steps reach
 
     Raises
     ------
@@ -165,7 +169,7 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
             parameters=solution.parameters,
         ),
     )
-    return look_beyond(resolve(model, numbers, request), few)
+    return look_beyond(resolve(model, numbers, request), few, turns)
 
 
 def reduced(run: Run) -> Reductions:
@@ -175,7 +179,7 @@ def reduced(run: Run) -> Reductions:
     return going.take()
 
 
-def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
+def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = None) -> Settled | None:
     """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
 
     None where the run is about as long, nothing turns, or something follows a table over time.
@@ -183,6 +187,7 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
     Parameters
     ----------
     few : reductions of the run, where they are known
+    turns : in place of those that `STEPS` steps reach
 
     Raises
     ------
@@ -196,9 +201,10 @@ def look_beyond(run: Run, few: Reductions | None = None) -> Settled | None:
         few = reduced(run)
     whole = (few.start + few.duration - run.begin) / turn
     cycle = timeline.cycle_turns(model.manifest, run.numbers.values)
-    least = timeline.whole_cycles(model.manifest, run.numbers.values, LEAST)
-    turns = min(least, int(STEPS * whole / max(few.steps, 1)))
-    turns -= turns % cycle
+    if turns is None:
+        least = timeline.whole_cycles(model.manifest, run.numbers.values, LEAST)
+        turns = min(least, int(STEPS * whole / max(few.steps, 1)))
+        turns -= turns % cycle
     if turns < 2.0 * few.duration / turn:
         return None
     longer, counter = replace(run, span=run.span.counting(turns), progress=None), _counter(model)

@@ -31,12 +31,15 @@ from ballpass.runtime.app.commands.shared import (
     show_json,
     warn,
 )
+from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import Question, declared, summary_of
+from ballpass.runtime.report.digits import uncertainties
 from ballpass.runtime.report.plain import json_text, to_plain
+from ballpass.runtime.report.report import Report
 from ballpass.runtime.report.text import show as show_report
 
 #: Parameters of a question that say how long to run.
@@ -212,9 +215,8 @@ def _ask(
         asked = _request(question, model, values, overrides)
         if "keep" in ask.__annotations__ and folder is not None:
             values["keep"] = folder / f"{question.name}.parts"
-        answer = ask(model, **values, parameters=overrides)
-        report = question.report(answer)
-        plain = to_plain(report) | {"request": asked}
+        answer, report, apart = _answered(ask, question, model, values, overrides)
+        plain = to_plain(report) | ({} if apart is None else {"uncertainty": apart}) | {"request": asked}
         written: list[Path] = []
         if folder is not None:
             if not question.always:
@@ -240,6 +242,25 @@ def _ask(
     if report.fault:
         complain(report.fault)
         raise typer.Exit(1)
+
+
+def _answered(
+    ask: Callable[..., Any], question: Question, model: Any, values: Mapping[str, Any], overrides: Mapping[str, float]
+) -> tuple[Any, Report, Any]:
+    """The answer, its report with the digits that hold, and the uncertainty of its numbers as plain data."""
+    from ballpass.runtime.native.loaded_model import LoadedModel
+
+    def at(rtol: float | None) -> Any:
+        return ask(model, **{**values, **({} if rtol is None else {"rtol": rtol})}, parameters=overrides)
+
+    runs = question.digits and isinstance(model, LoadedModel) and model.manifest.integrated
+    if not runs or values.get("recording") is not None:
+        answer = at(None)
+        return answer, question.report(answer), None
+    given = values.get("rtol")
+    rtol = model.run_settings.rtol if given is None else given
+    answers, report = repeated(at, question.report, rtol)
+    return answers[0], report, uncertainties([to_plain(question.report(answer)) for answer in answers], rtol)
 
 
 def _request(

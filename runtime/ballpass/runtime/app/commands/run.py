@@ -23,6 +23,7 @@ from ballpass.runtime.app.commands.shared import (
     size_words,
     warn,
 )
+from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.options import (
@@ -36,11 +37,12 @@ from ballpass.runtime.contract.options import (
 )
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
 from ballpass.runtime.questions import option_names
+from ballpass.runtime.report.digits import uncertainties
 
 if TYPE_CHECKING:
-    from ballpass.runtime.certify.growth import Growth
+    from ballpass.runtime.app.summary import Turned
     from ballpass.runtime.model import Model
-    from ballpass.runtime.quantity.values import QuantityValue
+    from ballpass.runtime.report.report import Report, ReportTable, Words
     from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.settle import Settled
     from ballpass.runtime.run.solution import Solution
@@ -73,6 +75,9 @@ AtKinks = Annotated[
         names=option_names.kinks,
     ),
 ]
+
+#: Entries of the summary about the computation, which differ between tolerances.
+OF_RUN = ("rtol", "steps", "located_kinks", "wall_time", "versions", "accuracy")
 
 #: Bytes of samples that are written without a remark.
 LARGE = 200_000_000
@@ -142,10 +147,11 @@ def run(
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.results import SOLUTION, SUMMARY
-        from ballpass.runtime.app.summary import add_turns
+        from ballpass.runtime.app.summary_table import render_accuracy
         from ballpass.runtime.app.transient_words import tables_left_out
         from ballpass.runtime.plot import CAPTIONS
-        from ballpass.runtime.run.locating import refuse_with_error
+        from ballpass.runtime.report.text import show as show_report
+        from ballpass.runtime.run.locating import LOCATED, refuse_with_error
 
         stages("read")
         formats = read_formats(format_)
@@ -173,33 +179,36 @@ def run(
         )
         stages("simulate")
         length: dict[str, Any] = {"cycles": cycles, "duration": duration, "transient": transient}
-        given: dict[str, Any] = {"parameters": asked.overrides, "initial": start}
-        solution = model.simulate(
-            **length,
-            **given,
-            method=method,
-            rtol=rtol,
-            kinks=cast("Kinks | None", kinks),
-            sample_rate=sample_rate,
-            progress=stages.fraction,
-            error=error,
-            of=of if error is not None else None,
-        )
+        given: dict[str, Any] = {"parameters": asked.overrides, "initial": start, "sample_rate": sample_rate}
+        first: dict[str, Any] = {"method": method, "rtol": rtol, "kinks": kinks}
+        if error is not None:
+            first |= {"error": error, "of": of}
+        solution = model.simulate(**length, **given, **first, progress=stages.fraction)
         # nobody asked for the turns of a transient that ballpass chose: they are most of such a file
         chosen = not model.manifest.run.stated and not _said(length)
         if solution.nbytes > LARGE and not chosen:
             size = size_words(solution.nbytes)
             note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
-        growth, longer = _look_behind(model, solution, length, given, of, stages, settle=turns is not None)
+        taken = solution.statistics
+        turned: list[Turned] = []  # of the first answer
+
+        def ask(tighter: float | None) -> tuple[dict[str, Any], Report]:
+            found, at = solution, taken.kinks
+            if tighter is not None:
+                at = LOCATED if taken.method in STEPPERS else None
+                found = model.simulate(**length, **given, method=taken.method, rtol=tighter, kinks=at)
+            return _answer(model, found, length, given, at, of, stages, turned, settle=turns is not None, every=all_)
+
+        answers, report = repeated(ask, lambda answer: answer[1], taken.rtol, integrated=bool(model.states))
+        summary = answers[0][0]
+        numbers = [{**each, **dict.fromkeys(OF_RUN)} for each, _ in answers]
+        summary["uncertainty"] = uncertainties(numbers, taken.rtol) or {}
+        for words in report.warnings:
+            warn(words)
         if chosen:
             for words in tables_left_out(model, model.numbers(asked.overrides).values):
                 warn(words)
-        taken = solution.statistics
-        method_taken: dict[str, Any] = {"method": taken.method, "rtol": taken.rtol, "kinks": taken.kinks}
-        quantities = model.quantities(of, **length, **given, **method_taken) if of else {}
         stages("write")
-        summary = _summary(model, solution, growth, quantities)
-        turned = add_turns(summary, longer, model.manifest, instead=turns is not None) if longer is not None else ""
         kept = solution.steady() if chosen else solution
         summary, files = _write_results(
             model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept
@@ -207,7 +216,10 @@ def run(
     if json_:
         show_json(summary)
         return
-    _show(model, solution, summary, turned, every=all_)
+    show_report(report)
+    if solution.accuracy is not None:
+        show_parts(render_accuracy(model, solution.accuracy))
+        show_parts(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
     show_files(folder, files, f" (solution.nc: {size})")
 
@@ -217,96 +229,63 @@ def _said(length: Mapping[str, float | None]) -> bool:
     return any(value is not None for value in length.values())
 
 
-def _look_behind(
+def _answer(
     model: Model,
     solution: Solution,
     length: Mapping[str, Any],
     given: Mapping[str, Any],
+    kinks: str | None,
     of: Sequence[str] | None,
     stages: Stages,
+    turned: list[Turned],
     *,
     settle: bool,
-) -> tuple[Growth | None, Settled | None]:
-    """What a moved start and more turns change in the numbers of a run; warns of both."""
+    every: bool,
+) -> tuple[dict[str, Any], Report]:
+    """The summary of a run, with what more turns change, and its report.
+
+    Parameters
+    ----------
+    turned : what is said of more turns, filled by the first of the answers that are compared
+    """
+    from ballpass.runtime.app.summary import add_turns, summarize
+    from ballpass.runtime.app.summary_table import render_quantities, render_summary
+    from ballpass.runtime.app.summary_words import stands_out
     from ballpass.runtime.app.transient_words import transient_words
     from ballpass.runtime.ask.peaks import run_of
+    from ballpass.runtime.report.report import Report
     from ballpass.runtime.run.settle import look_further
-    from ballpass.runtime.time import timeline
 
-    taken, parameters = solution.statistics, given["parameters"]
-    growth, longer = None, None
-    if solution.states and model.has_stepper:
-        growth = model.growth(**length, **given, rtol=taken.rtol, of=of)
+    taken, said = solution.statistics, list[str]()
+    numbers = model.numbers(given["parameters"])
+    same: dict[str, Any] = {"method": taken.method, "rtol": taken.rtol, "kinks": cast("Kinks | None", kinks)}
+    start: dict[str, Any] = {"parameters": given["parameters"], "initial": given["initial"]}
+    longer: Settled | None
     if settle:
-        longer = model.settle(
-            **given,
-            transient=length["transient"],
-            method=taken.method,
-            rtol=taken.rtol,
-            kinks=cast("Kinks | None", taken.kinks),
-            progress=stages.fraction,
-        )
-        if not longer.settled:
-            warn(longer.words)
-        if growth is not None and growth.spread and longer.settled:  # of the turns whose numbers are printed
-            steady = longer.reductions
-            growth = model.growth(
-                **given,
-                duration=steady.start + steady.duration - taken.begin,
-                transient=timeline.driver(model.manifest, model.numbers(parameters).values).turns(0.0, steady.start),
-                rtol=taken.rtol,
-            )
+        longer = model.settle(**start, **same, transient=length["transient"], progress=stages.fraction)
+        said += [] if longer.settled else [longer.words]
     else:
-        numbers = model.numbers(parameters)
-        longer = look_further(model, numbers, solution)
+        longer = look_further(model, numbers, solution, *(first.turns for first in turned))
         if longer is not None:
             own = run_of(model, numbers, solution)
             counted = replace(own.span, start=longer.reductions.start, transient=solution.transient_cycles)
             own = replace(own, span=counted)
-            for words in transient_words(model, own, longer, asked=_said(length)):
-                warn(words)
-    if growth is not None and growth.words:
-        warn(growth.words)
-    return growth, longer
-
-
-def _summary(
-    model: Model, solution: Solution, growth: Growth | None, quantities: Mapping[str, QuantityValue]
-) -> dict[str, Any]:
-    """What summary.json holds, but for numbers of more turns."""
-    from ballpass.runtime.app.summary import summarize
-
-    summary = summarize(model, solution, growth)
-    for words in summary["limits"]:
-        note(words)
-    if quantities:
-        summary["quantities"] = {name: asdict(one) for name, one in quantities.items()}
-        for name, (mean, deviation) in (growth.asked if growth is not None else {}).items():
-            summary["quantities"][name]["over_starts"] = {"value": {"mean": mean, "std": deviation}}
+            said += transient_words(model, own, longer, asked=_said(length))
+    summary = summarize(model, solution)
+    parts: list[Words | ReportTable] = []
+    if of and solution.accuracy is None:
+        found = model.quantities(of, **length, **start, **same)
+        summary["quantities"] = {name: asdict(one) for name, one in found.items()}
+        parts.append(render_quantities(model.manifest, summary["quantities"]))
     if solution.accuracy is not None:
         summary["accuracy"] = solution.accuracy.plain()
-    return summary
-
-
-def _show(model: Model, solution: Solution, summary: dict[str, Any], turned: str, *, every: bool) -> None:
-    """Print the table of a summary, with what more turns change."""
-    from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
-    from ballpass.runtime.app.summary_words import stands_out
-    from ballpass.runtime.report.report import Report
-    from ballpass.runtime.report.text import show as show_report
-
+    if longer is not None:
+        words, found_turned = add_turns(summary, longer, model.manifest, *turned, instead=settle)
+        parts, turned[:] = [*parts, words], [found_turned]
     table, left_out = render_summary(summary, model.manifest, every=every)
-    values = {**solution.parameters, **solution.constants}
-    show_report(Report(title=summary["title"], parts=(*stands_out(model.manifest, values, summary), table)))
-    if left_out:
-        show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
-    if "quantities" in summary and solution.accuracy is None:
-        show_parts(render_quantities(model.manifest, summary["quantities"]))
-    if turned:
-        show_parts(turned)
-    if solution.accuracy is not None:
-        show_parts(render_accuracy(model, solution.accuracy))
-        show_parts(solution.accuracy.words)
+    more = [f"{left_out} more rows with --all; every number with its name in summary.json."] if left_out else []
+    heads = stands_out(model.manifest, {**solution.parameters, **solution.constants}, summary)
+    return summary, Report(title=summary["title"], parts=(*heads, table, *more, *parts), warnings=said)
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:

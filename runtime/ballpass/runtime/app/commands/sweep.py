@@ -76,7 +76,7 @@ ROWS = 24
 #: Failures that the terminal names; all are in the files.
 NAMED = 5
 
-#: Up to so many members each is run twice by default, to see whether its numbers have digits.
+#: Up to so many members each is run twice by default, to see how many digits its numbers have.
 TWINS = 1000
 
 
@@ -99,12 +99,12 @@ def sweep(
     rtol: Rtol = None,
     method: Method = None,
     kinks: AtKinks = None,
-    growth: Annotated[
+    digits: Annotated[
         bool | None,
         Option(
-            words="Run each member a second time from a start moved by the tolerance, and mark numbers without digits: "
-            f"`~` in the table. If not given: up to {TWINS} members.",
-            flags=("--growth/--no-growth",),
+            words="Run each member at a tighter tolerance as well, and print the digits that both share, or ±. If not "
+            f"given: up to {TWINS} members.",
+            flags=("--digits/--no-digits",),
         ),
     ] = None,
     threads: Annotated[
@@ -174,7 +174,7 @@ def sweep(
                 method=method,
                 kinks=cast("Kinks | None", kinks),
                 threads=threads,
-                growth=count <= TWINS if growth is None else growth,
+                uncertainty=count <= TWINS if digits is None else digits,
                 client=client,
                 progress=stages.fraction,
             )
@@ -193,8 +193,8 @@ def sweep(
         files = swept.write(folder, formats if figures else ())
     if figures and len(ranges) > 2:
         note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")
-    if growth is None and count > TWINS:
-        note(f"{count} members: none was run twice to see whether its numbers have digits; --growth does.")
+    if digits is None and count > TWINS:
+        note(f"{count} members: none was run twice, and how many digits hold is not known; --digits does.")
     if json_:
         show_json(swept.report())
     else:
@@ -220,9 +220,10 @@ def _warn_of_members(swept: Sweep, count: int) -> None:
         warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
     if len(failures) > NAMED:
         warn(f"and {len(failures) - NAMED} more members without results; {TABLE} names all.")
-    if swept.uncertain:
+    scattering = swept.scattering
+    if len(scattering):
         warn(
-            f"{len(swept.uncertain)} of {count} members amplify small errors: a start moved by the tolerance changes "
-            f"numbers marked ~ in their first four digits. First: {swept.place(min(swept.uncertain))}. Take "
-            "statistics over more turns (--cycles), and compare no single extremes of them."
+            f"{len(scattering)} of {count} members amplify small errors: another tolerance gives other numbers, within "
+            f"about their ±. First: {swept.place(scattering[0])}. Take statistics over more turns (--cycles), and "
+            "compare no single extremes of them."
         )

@@ -19,6 +19,7 @@ from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.units import printed_unit, table_unit
 from ballpass.runtime.plot import FORMATS
+from ballpass.runtime.report.digits import SCATTER, shared_text
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
@@ -106,13 +107,11 @@ class Sweep:
         )
 
     @cached_property
-    def uncertain(self) -> dict[int, list[str]]:
-        """Quantities without digits, by member."""
-        found: dict[int, list[str]] = {}
-        for name, flags in self.result.uncertain.items():
-            for member in np.flatnonzero(flags).tolist():
-                found.setdefault(member, []).append(name)
-        return found
+    def scattering(self) -> list[int]:
+        """Members of which a number scatters with the tolerance."""
+        pairs = [(np.abs(self.result[name]), apart) for name, apart in self.result.uncertainty.items()]
+        found = np.any([apart > SCATTER * size for size, apart in pairs], axis=0) if pairs else []
+        return [int(member) for member in np.flatnonzero(found)]
 
     def report(self) -> dict[str, Any]:
         """The request and its results, in SI; members in the order of the table."""
@@ -136,6 +135,9 @@ class Sweep:
                 name: {
                     "unit": self.unit(name),
                     "values": finite(values.tolist()),
+                    **(
+                        {"uncertainty": finite(result.uncertainty[name].tolist())} if name in result.uncertainty else {}
+                    ),
                 }
                 for name, values in result.observables.items()
             },
@@ -143,9 +145,6 @@ class Sweep:
                 asdict(failure) | {"at": dict(zip(paths, self.point(failure.member), strict=True))}
                 for failure in result.failures
             ],
-            "uncertain": {
-                name: np.flatnonzero(flags).tolist() for name, flags in result.uncertain.items() if np.any(flags)
-            },
             "interrupted": result.interrupted,
             "statistics": asdict(result.statistics),
         }
@@ -174,11 +173,13 @@ class Sweep:
 
     def _write_table(self, path: Path) -> None:
         """A line for each member, SI; no number where a member has no result."""
-        quantities = self.result.observables
+        quantities = dict(self.result.observables)
+        units = {name: self.unit(name) for name in quantities}
+        for name, apart in self.result.uncertainty.items():
+            quantities[f"± {name}"], units[f"± {name}"] = apart, units[name]
         parameters = [f"{one.name} [{one.unit}]" for one in self.ranges]
-        heads = ["member", *parameters, *(f"{name} [{self.unit(name)}]" for name in quantities), "status", "message"]
-        ends = {member: ("DONE", f"no digits: {', '.join(names)}") for member, names in self.uncertain.items()}
-        ends |= {failure.member: (failure.status, failure.message) for failure in self.result.failures}
+        heads = ["member", *parameters, *(f"{name} [{units[name]}]" for name in quantities), "status", "message"]
+        ends = {failure.member: (failure.status, failure.message) for failure in self.result.failures}
         with path.open("w", encoding="utf-8", newline="") as stream:
             lines = csv.writer(stream, lineterminator="\n")
             lines.writerow(heads)
@@ -206,10 +207,15 @@ class Sweep:
                 yield _stem(name), figure
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
-        """A number with the digits that it has."""
+        """A number with the digits that it has, as tables show it."""
         if not math.isfinite(value):
             return "-"
-        return f"~{rounded(value, 2)}" if quantity in self.uncertain.get(member, ()) else rounded(value, 5)
+        if quantity not in self.result.uncertainty:
+            return rounded(value, 5)
+        apart = table_unit(self.unit(quantity))[0] * float(self.result.uncertainty[quantity][member])
+        if not math.isfinite(apart):
+            return f"{rounded(value, 2)} ±?"
+        return shared_text([rounded(value, 5), rounded(value + apart / 2.0, 5)])
 
     def all_members(self) -> ReportTable:
         """All members, each a row."""
