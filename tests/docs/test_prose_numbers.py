@@ -201,6 +201,8 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/howto/bearing_only.md": {
         "a rotor of 5 kg in a 6204, with 5 g at 20 mm from its axis": "numbers of the scene"
     },
+    "docs/howto/ensembles.md": {"up to 3e-7 (single runs: 1e-6)": "locating.py"},
+    "docs/reference/quantities.md": {"up to 3e-7 a step": "reductions.h"},
     "docs/howto/data_sets.md": {
         "above 95 %": "tests/test_cli_dataset.py, which the page names",
         "(`rtol` from 1e-6 on)": "a limit of the code",

@@ -561,8 +561,8 @@ class Model(PointModel, Questions):
         method : ``auto``, or one of the project's own stepper
         kinks : as in `simulate`: with ``located``, the default of ``auto`` and ``stepper`` at rtol up to 3e-7 (1e-6
             where a law jumps), steps end on the kinks of the laws and members run one at a time, because lanes cannot;
-            with ``stepped-over`` they run in lanes at any tolerance, but the error of a step at a kink exceeds a tight
-            one, and members agree with single runs only within that error.  ``statistics.kinks`` has the choice
+            with ``stepped-over`` they run in lanes at any tolerance, but a step's error at a kink exceeds a tight one
+            and members agree with single runs only within that error.  ``statistics.kinks`` has the choice
         threads : default: as many as processors
         lanes : False advances one member at a time
         uncertainty : run each member at a tighter tolerance as well, and at more of them where its numbers scatter;

@@ -36,7 +36,8 @@ LEAST = 3
 NAMED = 2
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
-_PLUS_MINUS = re.compile(rf"({_NUMBER.pattern})\s±({_NUMBER.pattern})")
+#: But for times and angles of a peak, which may be as high elsewhere.
+_PLUS_MINUS = re.compile(rf"({_NUMBER.pattern})\s±({_NUMBER.pattern})(?! s\b| deg\b)")
 
 
 def second_tolerance(rtol: float) -> float:
