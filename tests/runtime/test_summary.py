@@ -263,5 +263,5 @@ def test_a_run_with_some_outputs_has_the_summary_of_these(
     assert "reaction.A.x" not in found
     longer = look_further(model, model.numbers(), run)
     assert longer is not None
-    assert "highest ball force" in add_turns(found, longer, model.manifest, instead=False)
+    assert "highest ball force" in add_turns(found, longer, model.manifest, instead=False)[0]
     render_summary(found, model.manifest)

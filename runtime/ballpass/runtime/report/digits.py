@@ -27,7 +27,7 @@ TIGHTER = 1e-2
 SCATTER = 1e-3
 
 #: How many, each at another tolerance, where two tight ones differ as much: of a motion that amplifies small errors.
-FURTHER = 5
+FURTHER = 3
 
 #: Digits of a number that has no ±, if it is written with so many.
 LEAST = 3
@@ -50,6 +50,8 @@ def further(
 ) -> list[_Answer]:
     """An answer and a tighter one; where these scatter a third like that, and where the last two do `FURTHER` more.
 
+    These are at about the first's tolerance: where small errors grow, as good as any, and cheap.
+
     Parameters
     ----------
     first : as it was asked for
@@ -62,7 +64,7 @@ def further(
     if scattered(found):
         found.append(ask(1.1 * second))
         if scattered(found[1:]):
-            found += [ask((1.1 + 0.1 * k) * second) for k in range(1, FURTHER + 1)]
+            found += [ask((1.0 - 0.1 * k) * rtol) for k in range(1, FURTHER + 1)]
     return found
 
 
@@ -70,7 +72,7 @@ def uncertainty(values: Sequence[float], least: float = 0.0) -> float:
     """± of the first of some values.
 
     It is twice the distance from the mean of the others, or the distance and four of their standard deviations, of
-    which 99 % of further ones lie within.
+    which 98 % of further ones lie within.
 
     Parameters
     ----------
@@ -122,7 +124,10 @@ def _shared_number(texts: Sequence[str], between: str, least: int) -> str:
         return " or ".join(named)
     values = [float(text) for text in texts]
     most = max(len(re.sub(r"e.*|^-?[0.]+|\D", "", text)) for text in texts)
-    return _agreed(values, most, least) or plus_minus(values[0], uncertainty(values), between)
+    apart = uncertainty(values)
+    # draws of a motion that scatters may share a digit by luck
+    within = values if len(values) <= 3 else [values[0] - apart, values[0] + apart]
+    return _agreed(within, most, least) or plus_minus(values[0], apart, between)
 
 
 def _agreed(values: Sequence[float], most: int, least: int) -> str:

@@ -54,7 +54,7 @@ def has_kinks(manifest: Manifest) -> bool:
     One-sided damping of the rate alone has a kink in the force of each ball, but opposite balls cancel it in the
     motion: the manifest says so.  Hertz's law always has one.
     """
-    written = any(name == SWITCHES for name, _ in manifest.files)
+    written = SWITCHES in dict(manifest.files)
     laws = dict(manifest.smoothness)
     elastic = (laws.get(f"{bearing.prefix}elastic", "twice smooth") for bearing in manifest.bearings)
     return written or any(word != "twice smooth" for word in elastic)
