@@ -6,6 +6,7 @@ import math
 import subprocess
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-
 TABLE = 'table = { time = ["0 s", "0.2 s", "0.5 s"], speed = ["60 rpm", "900 rpm", "500 rpm"] }\n'
 TIMES, SPEEDS = np.array([0.0, 0.2, 0.5]), np.array([60.0, 900.0, 500.0]) * math.pi / 30.0
 NAMES = ["mechanism.driver.table.time.2", "mechanism.driver.table.speed.2", "mechanism.driver.table.speed.3"]
+OVER: Literal["stepped-over"] = "stepped-over"  # as lanes do
 TURN = 60.0 / 500.0  # behind the last row [s]
 
 
@@ -81,9 +83,9 @@ def test_runs_of_turns_end_where_the_driver_has_made_them(press: Model, tmp_path
     later = press.simulate(1.25, initial=run.end, transient=0)
     assert later.t[-1] == pytest.approx(when(5.75), rel=1e-13)
     table = {NAMES[1]: SPEEDS[1] * np.array([0.8, 1.0, 1.2])}
-    lanes = press.simulate_many(table, ["max:ball.force", "mean:inner.y"], cycles=4.5, transient=1.5)
+    lanes = press.simulate_many(table, ["max:ball.force", "mean:inner.y"], cycles=4.5, transient=1.5, kinks=OVER)
     for k, speed in enumerate(table[NAMES[1]].tolist()):
-        alone = press.reduce(4.5, transient=1.5, parameters={NAMES[1]: speed})
+        alone = press.reduce(4.5, transient=1.5, parameters={NAMES[1]: speed}, kinks=OVER)
         assert lanes["max:ball.force"][k] == pytest.approx(alone["ball.force"].maximum, rel=1e-5)
         assert lanes["mean:inner.y"][k] == pytest.approx(alone["inner.y"].mean, rel=1e-5)
     export_c(press.folder, tmp_path)

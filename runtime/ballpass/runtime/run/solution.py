@@ -222,7 +222,7 @@ class Solution:
         if self.transient_cycles == 0.0:
             return self
         if self.cycle_length is None:
-            raise RequestError("Transient cycles are turns, and nothing turns in this run: set transient to 0.")
+            raise RequestError("transient: its cycles are turns, and nothing turns in this run. Set it to 0.")
         start = timeline.driver(self.manifest, {**self.parameters, **self.constants}).after(self.transient_cycles)
         keep = self.t >= start * (1.0 - 1e-12)
         if np.count_nonzero(keep) < 2:
