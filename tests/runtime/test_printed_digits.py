@@ -177,15 +177,15 @@ def test_every_printed_number_of_a_random_bearing_holds(printed: Printed, tmp_pa
     check(printed, "run", "scene.toml", "--no-figures")
 
 
-@pytest.mark.parametrize("seed", [3, 4, *(pytest.param(k, marks=pytest.mark.long) for k in range(5, 5 + COUNT))])
+@pytest.mark.parametrize("seed", [4, 10, *(pytest.param(k, marks=pytest.mark.long) for k in range(11, 11 + COUNT))])
 def test_every_printed_number_of_a_scene_with_random_numbers_holds(
     printed: Printed, make_model: Callable[..., Model], scene_text: Callable[..., str], seed: int
 ) -> None:
-    """Seed 3 is chaotic, 4 is not."""
+    """Seed 10 is chaotic, 4 is not."""
     scene, law = SCENES[seed % len(SCENES)]
     changes = changes_of(scene_text(scene), law)
     model = make_model(scene, *changes)
     Path(f"{scene}.toml").write_text(scene_text(scene, *changes), encoding="utf-8")
     marked = check(printed, "run", f"{scene}.toml", "--no-figures", *settings(model, seed))
-    if seed in (3, 4):
-        assert (marked > 5) is (seed == 3)
+    if seed in (4, 10):
+        assert (marked > 5) is (seed == 10)

@@ -24,7 +24,12 @@ SCATTERED = (
 
 
 def repeated(
-    ask: Callable[[float | None], _Answer], report: Callable[[_Answer], Report], rtol: float, *, integrated: bool = True
+    ask: Callable[[float | None], _Answer],
+    report: Callable[[_Answer], Report],
+    rtol: float,
+    *,
+    judged: Callable[[_Answer], Report] | None = None,
+    integrated: bool = True,
 ) -> tuple[list[_Answer], Report]:
     """Answers (see `further`), and the report of the first with the digits that all bear.
 
@@ -33,6 +38,7 @@ def repeated(
     ask : takes the tolerance, None for that of the request
     report : of an answer
     rtol : tolerance of the request [1]
+    judged : report that also has numbers that are in files alone, to see whether the motion amplifies small errors
     integrated : False where nothing is, and no tolerance changes a digit
     """
     first = ask(None)
@@ -41,7 +47,7 @@ def repeated(
         return [first], found
     try:
         with warnings.catch_warnings(action="ignore"):  # they are said of the first
-            answers = further(first, ask, rtol, lambda two: scatters([report(answer) for answer in two]))
+            answers = further(first, ask, rtol, lambda two: scatters([(judged or report)(answer) for answer in two]))
     except SimulationError as fault:
         words = f"how many digits of these numbers hold is not known, for a run at another tolerance failed: {fault}"
         return [first], replace(found, warnings=[*found.warnings, words])

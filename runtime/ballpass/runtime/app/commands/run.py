@@ -147,7 +147,7 @@ def run(
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.results import SOLUTION, SUMMARY
-        from ballpass.runtime.app.summary_table import render_accuracy
+        from ballpass.runtime.app.summary_table import render_accuracy, render_summary
         from ballpass.runtime.app.transient_words import tables_left_out
         from ballpass.runtime.plot import CAPTIONS
         from ballpass.runtime.report.text import show as show_report
@@ -199,7 +199,13 @@ def run(
                 found = model.simulate(**length, **given, method=taken.method, rtol=tighter, kinks=at)
             return _answer(model, found, length, given, at, of, stages, turned, settle=turns is not None, every=all_)
 
-        answers, report = repeated(ask, lambda answer: answer[1], taken.rtol, integrated=bool(model.states))
+        def judged(answer: tuple[dict[str, Any], Report]) -> Report:
+            of_more = {**answer[0], **answer[0].get("longer", {})}
+            every = render_summary(of_more, model.manifest, every=True)[0]
+            return replace(answer[1], parts=(*answer[1].parts, every))
+
+        integrated = bool(model.states)
+        answers, report = repeated(ask, lambda answer: answer[1], taken.rtol, judged=judged, integrated=integrated)
         summary = answers[0][0]
         numbers = [{**each, **dict.fromkeys(OF_RUN)} for each, _ in answers]
         summary["uncertainty"] = uncertainties(numbers, taken.rtol) or {}
