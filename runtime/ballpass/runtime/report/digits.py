@@ -76,7 +76,7 @@ def uncertainty(values: Sequence[float], least: float = 0.0) -> float:
 
     Parameters
     ----------
-    least : over the number, where values differ at all [1]
+    least : where values differ at all
 
     Examples
     --------
@@ -88,7 +88,7 @@ def uncertainty(values: Sequence[float], least: float = 0.0) -> float:
         return 0.0
     mean = math.fsum(others) / len(others)
     scatter = math.dist(others, [mean] * len(others)) / math.sqrt(len(others) - 1) if len(others) > 1 else 0.0
-    return max(2.0 * abs(first - mean), abs(first - mean) + 4.0 * scatter, least * abs(first))
+    return max(2.0 * abs(first - mean), abs(first - mean) + 4.0 * scatter, least)
 
 
 def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) -> str:
@@ -104,7 +104,7 @@ def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) ->
     Examples
     --------
     >>> shared_text(["4390.5 N (ball 3)", "4390.9 N (ball 5)"]), shared_text(["0.0457", "0.0618"])
-    ('4390.5 ±0.9 N (ball 3 or 5)', '0.05 ±0.04')
+    ('4390.5 ±0.8 N (ball 3 or 5)', '0.05 ±0.04')
     """
     words = _NUMBER.split(texts[0])
     if len(set(texts)) == 1 or any(_NUMBER.split(text) != words for text in texts):
@@ -224,17 +224,19 @@ def scatters(reports: Sequence[Report]) -> bool:
     return any(float(apart) > SCATTER * abs(float(value)) for value, apart in pairs)
 
 
-def uncertainties(plain: Sequence[Any], least: float) -> Any:
+def uncertainties(plain: Sequence[Any], least: float, size: float = 0.0) -> Any:
     """± of the numbers of some plain data, in the shape of the first; None where all are equal, or not alike.
 
     Parameters
     ----------
-    least : see `uncertainty` [1]
+    least : ± of a number that differs at all, over it, or over the largest beside it of the same unit [1]
+    size : of that one
     """
     first = plain[0]
     if isinstance(first, Mapping):
         rest = [item for item in plain if isinstance(item, Mapping)]
-        found = {key: uncertainties([item.get(key) for item in rest], least) for key in first}
+        size = max((abs(item) for item in first.values() if isinstance(item, float)), default=0.0) * ("unit" in first)
+        found = {key: uncertainties([item.get(key) for item in rest], least, size) for key in first}
         return {key: each for key, each in found.items() if each is not None} or None
     if isinstance(first, (list, tuple)):
         if any(not isinstance(item, (list, tuple)) or len(item) != len(first) for item in plain):
@@ -244,4 +246,4 @@ def uncertainties(plain: Sequence[Any], least: float) -> Any:
     numbers = [item for item in plain if isinstance(item, (int, float)) and not isinstance(item, bool)]
     if len(numbers) < len(plain) or not all(map(math.isfinite, numbers)):
         return None
-    return uncertainty(numbers, least) or None
+    return uncertainty(numbers, least * max(size, abs(numbers[0]))) or None
