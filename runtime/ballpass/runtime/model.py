@@ -12,6 +12,7 @@ import numpy as np
 
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
+from ballpass.runtime.certify.growth import Growth, find_growth
 from ballpass.runtime.certify.member_digits import simulate_members
 from ballpass.runtime.certify.transient import find_transient
 from ballpass.runtime.contract.arguments import typed, typed_methods
@@ -609,6 +610,38 @@ class Model(PointModel, Questions):
 
         with shown("simulating members", progress) as tell:
             return simulate_members(parameters, run) if uncertainty else run(parameters)
+
+    def growth(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        rtol: float | None = None,
+        initial: Initial = None,
+        progress: Progress = None,
+    ) -> Growth:
+        """Change of the extremes and rms of a run when its start moves by the tolerance, by two runs of the stepper.
+
+        Parameters are those of `simulate`.  `uncertainties` says by how much the numbers of a motion scatter.
+
+        Raises
+        ------
+        RequestError
+            A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
+        SimulationError
+            The computation failed.
+
+        Examples
+        --------
+        >>> found = model.growth(cycles=4, transient=2)
+        >>> found.uncertain, found.worst < 1e-3
+        ((), True)
+        """
+        numbers, request = self._asked(parameters, initial, transient, cycles=cycles, duration=duration, rtol=rtol)
+        with shown("simulating from two starts", progress) as tell:
+            return find_growth(self, numbers, replace(request, progress=tell))
 
     def uncertainties(
         self,

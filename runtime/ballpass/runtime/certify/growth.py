@@ -16,6 +16,7 @@ import numpy as np
 from ballpass.runtime.certify.method_choice import MethodChoice, stepper_run
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.refused_scenes import refuse_still
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -62,6 +63,27 @@ class Growth(ShortRepr):
     changes: Mapping[str, float]
     uncertain: tuple[str, ...]
     steps: int
+
+    @property
+    def worst(self) -> float:
+        """Largest of the changes [1]."""
+        return max(self.changes.values(), default=0.0)
+
+
+def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growth:
+    """Compare a run with one whose start is moved by the tolerance.
+
+    Raises
+    ------
+    RequestError
+        A wrong request, a model without states, or no compiler for the stepper.
+    SimulationError
+        The computation failed.
+    """
+    refuse_still("growth", integrated=model.manifest.integrated)
+    run = stepper_run(model, numbers, request)
+    way = _way(run)
+    return _compare(run, way, way.rtol * run.magnitude[: len(run.magnitude) // 2])
 
 
 def by_moved_start(run: Run, moved: np.ndarray, most: int) -> Growth:

@@ -104,7 +104,7 @@ def sweep(
         Option(
             words="Run each member at a tighter tolerance as well, and print the digits that both share, or ±. If not "
             f"given: up to {TWINS} members.",
-            flags=("--digits/--no-digits",),
+            flags=("--digits/--no-digits", "--growth/--no-growth"),
         ),
     ] = None,
     threads: Annotated[
