@@ -210,7 +210,7 @@ def test_a_stiff_model_and_a_slow_turn_do_not_crawl(make_model: Callable[..., Mo
         assert abs(found.values[PEAK] / true_values(run, compared_quantities(run.model, PEAK))[0] - 1.0) < 0.01
         assert (
             LADDER[0][0].measure(QuantityRun(run.model, compared_quantities(run.model, PEAK)), run).steps
-            < 50_000 * run.cycles
+            < 50_000 * run.span.cycles
         )
 
 

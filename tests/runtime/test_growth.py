@@ -55,7 +55,10 @@ def test_a_law_whose_force_jumps_is_no_exception(make_model: Callable[..., Model
     start[0] = 1e-12
     ranges = [model.reduce(12, parameters=wide, rtol=1e-12, initial=k * start)["inner.x"].range for k in range(4)]
     assert np.ptp(ranges) > 1e-3 * np.mean(ranges)
-    assert model.uncertainties(of, 12, parameters=wide)[of] > np.ptp(ranges) / 2.0
+    # from the scene's own start, which is symmetrical to the last bit, tolerances would not show it
+    given = {"parameters": wide, "initial": start}
+    found, apart = model.quantities(of, 12, **given)[of].value, model.uncertainties(of, 12, **given)[of]
+    assert abs(found - ranges[1]) < apart < 1e-2 * found
 
 
 @pytest.mark.long
@@ -112,7 +115,7 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     found = [summary["uncertainty"]["quantities"][name]["value"] for name in asked]
     assert found[0] == pytest.approx(summary["uncertainty"]["inner.x"]["rms"], rel=1e-9, abs=0.0)
     assert found[1] > 0.0
-    assert all(re.search(rf"{name} +\S+ ±\S+ +µm", shown) for name in asked)
+    assert all(re.search(rf"{name} +\S+ +µm\n +±\S+", shown) for name in asked)
     assert "amplifies small errors" in said
     lines = shown.splitlines()
     (row,) = [k for k, line in enumerate(lines) if line.strip().startswith("Inner ring, x")]
@@ -120,7 +123,7 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     (force,) = [line for line in shown.splitlines() if line.strip().startswith("Torque of the")]
     assert "±" not in force
     code, shown, said = ballpass("run", PRESS, "--no-figures")
-    assert (code, "amplifies" in said, "±" in shown) == (0, False, False)
+    assert (code, "amplifies" in said, shown.count("±")) == (0, False, 1)  # in the sentence about tolerances
 
     code, shown, said = ballpass("sweep", PRESS, "--vary", f"{CLEARANCE}=10 um:60 um:2", *turns)
     assert code == 0

@@ -13,7 +13,7 @@ import numpy as np
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth
-from ballpass.runtime.certify.member_digits import simulate_members
+from ballpass.runtime.certify.member_digits import ends_of, parted, simulate_members
 from ballpass.runtime.certify.transient import find_transient
 from ballpass.runtime.contract.arguments import typed, typed_methods
 from ballpass.runtime.contract.errors import ArtefactError
@@ -32,7 +32,7 @@ from ballpass.runtime.point.run_start import Initial, start_of
 from ballpass.runtime.quantity.passages import passing_times
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.questions import Questions
-from ballpass.runtime.report.digits import SCATTER, further, uncertainty
+from ballpass.runtime.report.digits import further, uncertainty
 from ballpass.runtime.run.choose_method import method_names
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
@@ -591,6 +591,7 @@ class Model(PointModel, Questions):
             table: Table,
             rtol: float | None = rtol,
             kinks: str | None = kinks,
+            observables: str | Sequence[str] = observables,
         ) -> EnsembleResult:
             where = {"threads": threads} if client is None else {"client": client}
             return (simulate_many if client is None else simulate_parts)(
@@ -609,7 +610,7 @@ class Model(PointModel, Questions):
             )
 
         with shown("simulating members", progress) as tell:
-            return simulate_members(parameters, run) if uncertainty else run(parameters)
+            return simulate_members(parameters, observables, run, self.states) if uncertainty else run(parameters)
 
     def growth(
         self,
@@ -675,9 +676,12 @@ class Model(PointModel, Questions):
         (0.0, True)
         """
 
+        names = [of] if isinstance(of, str) else list(of)
+        judged = ends_of(self.states)
+
         def ask(tighter: float | None) -> list[float]:
             found = self.quantities(
-                of,
+                [*names, *judged],
                 cycles,
                 duration=duration,
                 transient=transient,
@@ -688,15 +692,12 @@ class Model(PointModel, Questions):
                 kinks=kinks,
                 progress=progress,
             )
-            return [one.value for one in found.values()]
+            return [found[name].value for name in [*names, *judged]]
 
         asked = self.run_settings.rtol if rtol is None else rtol
 
-        def scattered(two: Sequence[list[float]]) -> bool:
-            return any(uncertainty(pair) > SCATTER * abs(pair[0]) for pair in zip(*two, strict=True))
-
-        every = zip(*further(ask(None), ask, asked, scattered), strict=True)
-        return dict(zip([of] if isinstance(of, str) else of, map(uncertainty, every), strict=True))
+        every = np.array(further(ask(None), ask, asked, lambda two: bool(np.any(parted(np.array(two), len(names))))))
+        return dict(zip(names, map(uncertainty, every.T.tolist()), strict=False))
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

@@ -15,16 +15,45 @@ from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.report.digits import SCATTER, further, uncertainty
 
+#: States at the end apart by so much of their range: motions that have parted [1].
+PARTED = 3e-4
 
-def simulate_members(table: Table, run: Callable[..., EnsembleResult]) -> EnsembleResult:
-    """Run an ensemble, and its members again: all at a tighter tolerance, those whose numbers scatter at more.
+
+def ends_of(states: Sequence[str]) -> list[str]:
+    """Quantities that show whether motions have parted: range and end of each state."""
+    return [f"{kind}:{state}" for kind in ("range", "end") for state in states]
+
+
+def parted(two: np.ndarray, asked: int) -> np.ndarray:
+    """Whether two answers differ in the numbers that are asked for, or their motions at the end.
+
+    Two answers may share a number by luck, or have it before errors have grown.
 
     Parameters
     ----------
-    run : `simulate_many` of a table, with all else given; takes `rtol` and `kinks`
+    two : numbers of both, those asked for and those of `ends_of` behind them, shape (2, numbers, ...)
+    asked : how many are asked for
     """
-    result = run(table)
-    first = np.array(list(result.observables.values()))
+    apart = np.abs(two[1] - two[0])
+    sizes, ends = np.split(np.abs(two[0][asked:]), 2)[0], np.split(apart[asked:], 2)[1]
+    own = np.any(2.0 * apart[:asked] > SCATTER * np.abs(two[0][:asked]), axis=0)
+    return np.asarray(own | np.any(ends > PARTED * sizes, axis=0))
+
+
+def simulate_members(
+    table: Table, observables: str | Sequence[str], run: Callable[..., EnsembleResult], states: Sequence[str]
+) -> EnsembleResult:
+    """Run an ensemble, and its members again: all at a tighter tolerance, those whose motions part at more.
+
+    Parameters
+    ----------
+    run : `simulate_many` of a table, with all else given; takes `observables`, `rtol` and `kinks`
+    states : names
+    """
+    asked = [observables] if isinstance(observables, str) else list(observables)
+    names = list(dict.fromkeys(asked))
+    result = run(table, observables=[*names, *ends_of(states)])
+    first = np.array([result[name] for name in [*names, *ends_of(states)]])
     left, interrupted = np.flatnonzero(np.isfinite(first).any(axis=0)), result.interrupted
 
     def again(rtol: float) -> np.ndarray:
@@ -32,22 +61,23 @@ def simulate_members(table: Table, run: Callable[..., EnsembleResult]) -> Ensemb
         found = np.full_like(first, np.nan)
         if len(left) and not interrupted:
             rows = {name: values[left] for name, values in result.parameters.items()}
-            some = run(rows, rtol=rtol, kinks=result.statistics.kinks)
-            found[:, left] = [some[name] for name in result]
+            every = [*names, *ends_of(states)]
+            some = run(rows, observables=every, rtol=rtol, kinks=result.statistics.kinks)
+            found[:, left] = [some[name] for name in every]
             interrupted = some.interrupted
         return found
 
     def scattered(two: Sequence[np.ndarray]) -> bool:
         """Leave the members whose numbers differ."""
         nonlocal left
-        differ = 2.0 * np.abs(two[1] - two[0]) > SCATTER * np.abs(first)
-        left = left[np.any(differ[:, left], axis=0)]
+        left = left[parted(np.array(two)[:, :, left], len(names))]
         return len(left) > 0
 
-    runs = np.array(further(first, again, result.statistics.rtol, scattered))
+    runs = np.array(further(first, again, result.statistics.rtol, scattered))[:, : len(names)]
     every = [[_apart(values) for values in row] for row in np.moveaxis(runs, 0, -1)]
-    uncertain = dict(zip(result, np.array(every), strict=True))
-    return replace(result, interrupted=interrupted, uncertainty=uncertain)
+    uncertain = dict(zip(names, np.array(every), strict=True))
+    kept = {name: result[name] for name in names}
+    return replace(result, observables=kept, interrupted=interrupted, uncertainty=uncertain)
 
 
 def _apart(values: np.ndarray) -> float:

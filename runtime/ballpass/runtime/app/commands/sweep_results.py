@@ -110,7 +110,8 @@ class Sweep:
     def scattering(self) -> list[int]:
         """Members of which a number scatters with the tolerance."""
         pairs = [(np.abs(self.result[name]), apart) for name, apart in self.result.uncertainty.items()]
-        found = np.any([apart > SCATTER * size for size, apart in pairs], axis=0) if pairs else []
+        # what steps across kinks lose is in ± as well
+        found = np.any([apart > 5.0 * SCATTER * size for size, apart in pairs], axis=0) if pairs else []
         return [int(member) for member in np.flatnonzero(found)]
 
     def report(self) -> dict[str, Any]:
