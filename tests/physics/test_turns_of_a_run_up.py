@@ -164,4 +164,4 @@ def test_a_run_up_comes_to_the_steady_state_of_its_last_speed(tmp_path: Path) ->
     kinds = [[motion.kind for motion in model.bifurcation(path, readings=30).up] for model in (known, there)]
     assert kinds[0] == kinds[1]
     ends = [model.steady(over="bearing.clearance=10 um:9 um").branches[0].points[-1] for model in (known, there)]
-    assert ends[1].nodes[0] == pytest.approx(ends[0].nodes[0], rel=1e-6, abs=1e-12)
+    assert ends[1].nodes[0] == pytest.approx(ends[0].nodes[0], rel=1e-5)  # of runs at the tolerance of branches

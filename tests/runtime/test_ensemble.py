@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from time import monotonic, sleep
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas
@@ -70,7 +70,8 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
     """Lanes change their family where single runs do, as often, and their step sizes agree."""
     model, columns = press(make_model, law), table(8)
     result = model.simulate_many(columns, ["end:inner.vx"], cycles=1, transient=0, rtol=rtol)
-    singles = [model.reduce(1, transient=0, rtol=rtol, parameters=member(columns, k)) for k in range(8)]
+    at: Literal["stepped-over", "located"] = "stepped-over" if rtol > 3e-7 else "located"  # single runs locate
+    singles = [model.reduce(1, transient=0, rtol=rtol, parameters=member(columns, k), kinks=at) for k in range(8)]
     assert result.statistics.switches > 0
     assert result.statistics.steps == pytest.approx(sum(single.steps for single in singles), rel=0.01)
     assert result.statistics.rejected == pytest.approx(sum(single.rejected for single in singles), rel=0.05)

@@ -114,7 +114,8 @@ def _rate_unit(unit: str) -> str:
 
 def experiment(manifest: Manifest) -> tuple[float, float]:
     """Length of the scene's run, and time between its samples [s]."""
-    values = {info.name: info.default for info in manifest.parameters}
+    # where a shaft stands at t = 0 is derived, and changes no length
+    values = {info.name: 0.0 for info in manifest.constants} | {p.name: p.default for p in manifest.parameters}
     run, turn = manifest.run, stretch(manifest, values)
     duration = run.duration if run.cycles is None else driver(manifest, values).after(run.cycles)
     if duration is None or not math.isfinite(duration):

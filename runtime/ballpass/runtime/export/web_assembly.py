@@ -28,7 +28,7 @@ from ballpass.runtime.ratings.of_bearing import ratings_of
 #: What a page calls; memory for what it reads is the module's.
 CALLED = (
     *(f"ballpass_{name}" for name in ("make", "value", "set_at", "start", "run_to", "rows", "error")),
-    *(f"ballpass_{name}" for name in ("stop", "values", "ratings", "next_switch")),
+    *(f"ballpass_{name}" for name in ("stop", "values", "ratings", "next_switch", "turns", "after")),
     *(f"ballpass_{name}" for name in ("state_size", "save", "restore", "reduce")),
     "malloc",
 )
