@@ -185,3 +185,11 @@ def test_two_runs_that_agree_by_luck_are_no_proof(tmp_path: Path) -> None:
     (estimate,) = missed.value.best.estimates.values()
     (value,) = missed.value.best.values.values()
     assert max(abs(each / value - 1.0) for each in highest) < 10.0 * estimate
+
+
+def test_numbers_at_rest_take_no_step_for_their_uncertainty(press: Model) -> None:
+    found = press.simulate_many({CLEARANCE: [5e-6, 1e-5]}, "static_peak_ball_force", uncertainty=True)
+    assert found.statistics.steps == 0
+    assert np.all(found.uncertainty["static_peak_ball_force"] == 0.0)
+    moving = press.simulate_many({CLEARANCE: [5e-6, 1e-5]}, "peak_ball_force", uncertainty=True)
+    assert moving.statistics.steps > 0

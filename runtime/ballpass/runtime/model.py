@@ -610,7 +610,7 @@ class Model(PointModel, Questions):
             )
 
         with shown("simulating members", progress) as tell:
-            return simulate_members(parameters, observables, run, self.states) if uncertainty else run(parameters)
+            return simulate_members(self, parameters, observables, run) if uncertainty else run(parameters)
 
     def growth(
         self,
@@ -677,7 +677,7 @@ class Model(PointModel, Questions):
         """
 
         names = [of] if isinstance(of, str) else list(of)
-        judged = ends_of(self.states)
+        judged = ends_of(self, names)
 
         def ask(tighter: float | None) -> list[float]:
             found = self.quantities(

@@ -13,15 +13,21 @@ import numpy as np
 
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.members import Table
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.grammar import parse_quantity
+from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.digits import SCATTER, further, uncertainty
 
 #: States at the end apart by so much of their range: motions that have parted [1].
 PARTED = 3e-4
 
 
-def ends_of(states: Sequence[str]) -> list[str]:
-    """Quantities that show whether motions have parted: range and end of each state."""
-    return [f"{kind}:{state}" for kind in ("range", "end") for state in states]
+def ends_of(model: LoadedModel, asked: Sequence[str]) -> list[str]:
+    """Quantities that show whether motions part: range and end of each state; none where all is asked at rest."""
+    kinds = [KINDS[parse_quantity(model.manifest, name).kind] for name in asked]
+    if all(kind.at_rest is not None for kind in kinds):
+        return []
+    return [f"{kind}:{state}" for kind in ("range", "end") for state in model.states]
 
 
 def parted(two: np.ndarray, asked: int) -> np.ndarray:
@@ -41,19 +47,19 @@ def parted(two: np.ndarray, asked: int) -> np.ndarray:
 
 
 def simulate_members(
-    table: Table, observables: str | Sequence[str], run: Callable[..., EnsembleResult], states: Sequence[str]
+    model: LoadedModel, table: Table, observables: str | Sequence[str], run: Callable[..., EnsembleResult]
 ) -> EnsembleResult:
     """Run an ensemble, and its members again: all at a tighter tolerance, those whose motions part at more.
 
     Parameters
     ----------
     run : `simulate_many` of a table, with all else given; takes `observables`, `rtol` and `kinks`
-    states : names
     """
     asked = [observables] if isinstance(observables, str) else list(observables)
     names = list(dict.fromkeys(asked))
-    result = run(table, observables=[*names, *ends_of(states)])
-    first = np.array([result[name] for name in [*names, *ends_of(states)]])
+    every = [*names, *ends_of(model, names)]
+    result = run(table, observables=every)
+    first = np.array([result[name] for name in every])
     left, interrupted = np.flatnonzero(np.isfinite(first).any(axis=0)), result.interrupted
 
     def again(rtol: float) -> np.ndarray:
@@ -61,7 +67,6 @@ def simulate_members(
         found = np.full_like(first, np.nan)
         if len(left) and not interrupted:
             rows = {name: values[left] for name, values in result.parameters.items()}
-            every = [*names, *ends_of(states)]
             some = run(rows, observables=every, rtol=rtol, kinks=result.statistics.kinks)
             found[:, left] = [some[name] for name in every]
             interrupted = some.interrupted
@@ -74,8 +79,8 @@ def simulate_members(
         return len(left) > 0
 
     runs = np.array(further(first, again, result.statistics.rtol, scattered))[:, : len(names)]
-    every = [[_apart(values) for values in row] for row in np.moveaxis(runs, 0, -1)]
-    uncertain = dict(zip(names, np.array(every), strict=True))
+    apart = [[_apart(values) for values in row] for row in np.moveaxis(runs, 0, -1)]
+    uncertain = dict(zip(names, np.array(apart), strict=True))
     kept = {name: result[name] for name in names}
     return replace(result, observables=kept, interrupted=interrupted, uncertainty=uncertain)
 

@@ -353,9 +353,8 @@ def _spans(
     for member in np.flatnonzero(~able).tolist():
         try:
             turning = timeline.driver(manifest, {name: column[member] for name, column in members.columns.items()})
-            given = math.nan if duration is None else duration
-            span = Span.of(turning, cycles=cycles, duration=given, transient=transient).check()
-            durations[member], starts[member] = span.end, span.start
+            of_it = Span.of(turning, cycles=cycles, duration=duration or math.nan, transient=transient).check()
+            durations[member], starts[member] = of_it.end, of_it.start
         except RequestError as fault:
             if not tables and np.all(turns == turns[member]):  # and so with every other one
                 raise

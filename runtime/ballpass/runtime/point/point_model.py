@@ -65,7 +65,7 @@ class PointModel(LoadedModel):
         return {info.name: values[info.name] for info in self.manifest.constants}
 
     def period(self, parameters: Mapping[str, float] | None = None) -> float:
-        """Time of one turn of driver or shaft [s]; infinite when nothing turns.
+        """Time of a turn of driver or shaft [s], behind the last row of a table of its speed; infinite where it stands.
 
         Examples
         --------

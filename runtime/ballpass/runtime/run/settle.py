@@ -29,7 +29,7 @@ from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, asked_span, resolve
 from ballpass.runtime.run.solution import Solution
-from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.run.start import state_at
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
@@ -162,12 +162,7 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution, turns
         method=statistics.method,
         rtol=statistics.rtol,
         kinks=statistics.kinks,
-        initial=RunEnd(
-            time=statistics.begin,
-            x=np.array(statistics.initial),
-            states=solution.states,
-            parameters=solution.parameters,
-        ),
+        initial=state_at(model, numbers, statistics.begin, np.array(statistics.initial)),
     )
     return look_beyond(resolve(model, numbers, request), few, turns)
 
