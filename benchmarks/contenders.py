@@ -10,7 +10,7 @@ import numpy as np
 
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.native.stepper import End
-from ballpass.runtime.run.locating import choose_kinks, stepper_for
+from ballpass.runtime.request.locating import choose_kinks, stepper_for
 from benchmarks.problem import POINTS, Cycle, Member
 
 DECADES = tuple(10.0**-k for k in range(2, 11))

@@ -22,7 +22,7 @@ from ballpass.runtime import load
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.model import Model
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.request.segments import segment_edges
 from ballpass.runtime.time import timeline
 from benchmarks.press import Press, press_numbers
 

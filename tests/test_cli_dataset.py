@@ -19,9 +19,9 @@ from typer.testing import CliRunner
 from ballpass.runtime import Model, load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.data_set_spec import read_spec
-from ballpass.runtime.ask.vibration import diagnosis, envelope
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.quantity.characteristic import characteristic_lines
+from ballpass.runtime.vibration.diagnosis import diagnosis, envelope
 
 ROOT = Path(__file__).resolve().parent.parent
 SPEC = f"""title = "Tight and loose"

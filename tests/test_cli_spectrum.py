@@ -14,7 +14,7 @@ from matplotlib.image import imread
 from typer.testing import Result
 
 from ballpass.runtime import load
-from ballpass.runtime.ask.spectrum import amplitude_spectrum
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "rotor.toml"
 

@@ -26,8 +26,8 @@ from ballpass.runtime.certify.trade_report import percent
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "howto" / "accuracy_numbers.md"

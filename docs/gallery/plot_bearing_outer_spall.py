@@ -14,9 +14,9 @@ import matplotlib.pyplot as plt
 
 from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
-from ballpass.runtime.ask.spectrum import amplitude_spectrum
-from ballpass.runtime.ask.vibration import diagnosis, envelope
 from ballpass.runtime.quantity.characteristic import characteristic_lines
+from ballpass.runtime.vibration.diagnosis import diagnosis, envelope
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum
 
 SPALL = """
 [bearing.defects.spall]

@@ -18,7 +18,7 @@ from sklearn.ensemble import RandomForestClassifier
 
 from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import Distribution, SignalClass, Signals, load, make_data_set
-from ballpass.runtime.ask.vibration import diagnosis, envelope
+from ballpass.runtime.vibration.diagnosis import diagnosis, envelope
 
 SPALL = """
 [bearing.defects.spall]

@@ -25,7 +25,7 @@ from sklearn.metrics import confusion_matrix
 
 from ballpass.derive import generate
 from ballpass.runtime import Distribution, Sensor, SignalClass, Signals, load, make_data_set
-from ballpass.runtime.ask.vibration import envelope
+from ballpass.runtime.vibration.diagnosis import envelope
 
 TABLE = HERE / "cwru_features.csv"
 SOURCE = """Lines read off recordings of the Bearing Data Center, Case Western Reserve University (drive end), a row a

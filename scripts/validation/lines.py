@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from ballpass.runtime.ask.vibration import envelope
+from ballpass.runtime.vibration.diagnosis import envelope
 
 HERE = Path(__file__).parent
 Array = NDArray[np.float64]

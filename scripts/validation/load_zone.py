@@ -22,7 +22,7 @@ from scripts.validation.spall_lines import SCENE
 
 from ballpass.derive import generate
 from ballpass.runtime import Model, load
-from ballpass.runtime.ask.vibration import DiagnosisStatistics, diagnosis
+from ballpass.runtime.vibration.diagnosis import DiagnosisStatistics, diagnosis
 
 TABLE = HERE / "cwru_load_zone.csv"
 SOURCE = """Read off recordings of the Bearing Data Center, Case Western Reserve University (drive end, 12 kHz), by

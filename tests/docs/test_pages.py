@@ -29,9 +29,9 @@ from ballpass.derive import generate
 from ballpass.derive.scene.units import looked_up_size
 from ballpass.runtime import BallpassError, load
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.ask.measured import read_trial
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.units import unit_size
+from ballpass.runtime.fit.measured import read_trial
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scripts.validation import cage_lag, lines, load_zone, spall_lines
 
-from ballpass.runtime.ask.vibration import diagnosis
+from ballpass.runtime.vibration.diagnosis import diagnosis
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "validation"
 SCRIPTS = ("spall_lines", "load_zone", "cage_lag", "lives", "motions", "classifier")

@@ -15,10 +15,10 @@ from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.point.conditioning import ConditioningWarning
+from ballpass.runtime.request.magnitudes import model_scales
+from ballpass.runtime.request.segments import LARGEST_PHASE, segment_edges
 from ballpass.runtime.run.failure_location import locate_failure
 from ballpass.runtime.run.limits import brief_limit, step_limit
-from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.run.segments import LARGEST_PHASE, segment_edges
 from ballpass.runtime.time import timeline
 
 ModelMaker = Callable[..., Model]

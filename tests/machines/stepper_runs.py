@@ -12,7 +12,7 @@ import numpy as np
 from ballpass.runtime import Model
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.stepper import Outcome, Segments
-from ballpass.runtime.run.segments import TURNED, segment_edges
+from ballpass.runtime.request.segments import TURNED, segment_edges
 from ballpass.runtime.time import timeline
 
 

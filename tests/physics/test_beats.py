@@ -10,7 +10,7 @@ import pytest
 
 from ballpass.runtime import Model
 from ballpass.runtime.app.transient_words import warnings_of_transient
-from ballpass.runtime.run.beats import beats
+from ballpass.runtime.request.beats import beats
 
 PUSH = """[loads.push]
 type = "harmonic"

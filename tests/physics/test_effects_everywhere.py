@@ -34,8 +34,8 @@ from virtual import virtual_model
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load
-from ballpass.runtime.ask.spectrum import AmplitudeSpectrum
-from ballpass.runtime.ask.vibration import order_spectrum
+from ballpass.runtime.vibration.diagnosis import order_spectrum
+from ballpass.runtime.vibration.spectrum import AmplitudeSpectrum
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MOTOR = """[mechanism.driver.torque]

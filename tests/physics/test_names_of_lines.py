@@ -12,7 +12,7 @@ import pytest
 from ballpass.runtime import Model
 from ballpass.runtime.quantity.characteristic import CharacteristicLine, name_of
 from ballpass.runtime.questions.spectrum import spectrum
-from ballpass.runtime.run.solution_file import load_solution
+from ballpass.runtime.solution.solution_file import load_solution
 
 DAMAGED = re.compile("BPFI|BSF|FTF")
 PUSH = """[loads.push]

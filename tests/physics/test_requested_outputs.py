@@ -17,7 +17,7 @@ from ballpass.derive import derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime.run.request import on_request
+from ballpass.runtime.request.request import on_request
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MOTION = ("*inner.a[xy]", "*outer.a[xy]", "point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude")

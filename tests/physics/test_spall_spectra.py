@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.spectrum import amplitude_spectrum
-from ballpass.runtime.ask.vibration import envelope
 from ballpass.runtime.quantity.characteristic import characteristic_lines, name_of
+from ballpass.runtime.vibration.diagnosis import envelope
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum
 
 SPALLS = """
 [bearing.defects.outside]

@@ -14,7 +14,7 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.app.transient_words import warnings_of_transient
 from ballpass.runtime.certify.certificate import Verdict
-from ballpass.runtime.run.settle import LEAST
+from ballpass.runtime.solution.settle import LEAST
 from ballpass.runtime.time.timeline import whole_cycles
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -18,12 +18,12 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.run import request
+from ballpass.runtime.request import request
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
+from ballpass.runtime.request.sampling import Sampling
+from ballpass.runtime.request.segments import WORK, segment_edges
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.sampling import Sampling
-from ballpass.runtime.run.segments import WORK, segment_edges
 from ballpass.runtime.run.trajectory import start_trajectory
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -14,7 +14,13 @@ from flow_differences import differences
 from scipy.stats import t as student
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask.lyapunov import exponent_of, kind_of_motion, largest_exponent, period_of, strobe_with_tangents
+from ballpass.runtime.motion.lyapunov import (
+    exponent_of,
+    kind_of_motion,
+    largest_exponent,
+    period_of,
+    strobe_with_tangents,
+)
 
 THREE_EIGHTHS = {"bearing.pitch_diameter": 31.75e-3}
 RPM = math.tau / 60.0

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ballpass.runtime.ask import continuation
-from ballpass.runtime.ask.continuation import SteadyBranch, follow
-from ballpass.runtime.ask.shooting import Residual
+from ballpass.runtime.motion import continuation
+from ballpass.runtime.motion.continuation import SteadyBranch, follow
+from ballpass.runtime.motion.shooting import Residual
 
 
 @pytest.fixture(autouse=True)

@@ -24,10 +24,10 @@ from ballpass.runtime.many.members import Members, Spans, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import End
-from ballpass.runtime.run.choose_method import stepper_method
-from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.run.resolve import SCALED_TURNS
-from ballpass.runtime.run.segments import TURNED, edge_windows, segment_edges
+from ballpass.runtime.request.choose_method import stepper_method
+from ballpass.runtime.request.magnitudes import model_scales
+from ballpass.runtime.request.resolve import SCALED_TURNS
+from ballpass.runtime.request.segments import TURNED, edge_windows, segment_edges
 from ballpass.runtime.time import timeline
 
 ModelMaker = Callable[..., Model]

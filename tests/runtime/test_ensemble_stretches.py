@@ -22,8 +22,8 @@ from ballpass.runtime.many.chunks import PATIENCE
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Spans, make_members
 from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
-from ballpass.runtime.run.choose_method import stepper_method
-from ballpass.runtime.run.locating import Kinks
+from ballpass.runtime.request.choose_method import stepper_method
+from ballpass.runtime.request.locating import Kinks
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")

@@ -17,7 +17,7 @@ from ballpass.runtime.certify.error_target import TargetMissed, meet_target
 from ballpass.runtime.certify.method_choice import compared_quantities, stepper_run
 from ballpass.runtime.certify.trade import REFERENCE, SECOND, perturbed
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.run.request import Request
+from ballpass.runtime.request.request import Request
 
 COUNT = int(os.environ.get("BALLPASS_ESTIMATES", "1"))
 SCENES = (

@@ -15,9 +15,9 @@ from ballpass.runtime.certify.method_choice import MethodChoice, compared_quanti
 from ballpass.runtime.certify.trade import REFERENCE, perturbed
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run.accuracy import Accuracy
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.solution.accuracy import Accuracy
 
 PEAK = "peak_ball_force"
 SPEED, CLEARANCE = "mechanism.driver.speed", "bearing.clearance"

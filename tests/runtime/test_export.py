@@ -28,8 +28,8 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.bounds import allowed
 from ballpass.runtime.contract.manifest import ParameterInfo
 from ballpass.runtime.export.c_program import export_c
-from ballpass.runtime.run.locating import tight_below
-from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.request.locating import tight_below
+from ballpass.runtime.request.segments import segment_edges
 from ballpass.runtime.time import timeline
 
 SHORT, LONG = (

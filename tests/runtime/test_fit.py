@@ -11,8 +11,8 @@ import pytest
 import xarray
 
 from ballpass.runtime import Model, RequestError, SimulationError
-from ballpass.runtime.ask.fit_report import FitAnswer
-from ballpass.runtime.ask.measured import read_trial
+from ballpass.runtime.fit.measured import read_trial
+from ballpass.runtime.fit.report import FitAnswer
 from ballpass.runtime.report.text import to_text
 
 RATIO, CLEARANCE, HOUSING = "bearing.damping.ratio", "bearing.clearance", "bearing.outer_ring.stiffness"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask import drawn_members
 from ballpass.runtime.ask.kept_parts import Arrays, KeptParts
+from ballpass.runtime.shares import drawn_members
 
 CLEARANCE = "bearing.clearance=2 um:15 um"
 

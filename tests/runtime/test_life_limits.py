@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.life_limits import limits_of
+from ballpass.runtime.life.limits import limits_of
 
 #: A light ring, much damped: the force on the bearing is the load.
 CALM = {"bearing.inner_ring.mass": 0.2, "bearing.inner_ring.damping": 5e3}

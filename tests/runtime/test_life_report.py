@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import quad
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.life_report import _oscillation
-from ballpass.runtime.ask.wear import LoadSamples, wear_field
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import DutyInfo, LubricationInfo
+from ballpass.runtime.life.report import _oscillation
+from ballpass.runtime.life.wear import LoadSamples, wear_field
 from ballpass.runtime.questions.life import life_figures
 from ballpass.runtime.ratings import groove_slip, life
 from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of, ratings_of

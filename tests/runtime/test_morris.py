@@ -9,7 +9,7 @@ import pytest
 from scipy.stats.qmc import Halton
 
 from ballpass.runtime import Model, QuantityFunction
-from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
+from ballpass.runtime.shares.elementary_effects import elementary_effects, moved
 
 
 def test_effects_of_a_sum_and_of_a_product_are_those_of_closed_forms() -> None:

@@ -28,14 +28,14 @@ from ballpass.runtime import (
     Sensor,
     SignalClass,
 )
-from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
-from ballpass.runtime.ask.vibration import diagnosis, spectrogram
 from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.many.signals import Signals
 from ballpass.runtime.report.html import to_html
 from ballpass.runtime.report.report import Marked, Report, ReportTable
 from ballpass.runtime.show import html
+from ballpass.runtime.vibration.diagnosis import diagnosis, spectrogram
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum, power_spectrum
 
 ROOT = Path(__file__).resolve().parents[2]
 

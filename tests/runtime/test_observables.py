@@ -17,10 +17,10 @@ from ballpass.runtime.ask.observables import (
     stroboscopic_points,
     turns,
 )
-from ballpass.runtime.ask.spectrum import amplitude_spectrum, whole_cycles
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
-from ballpass.runtime.run.ball_angles import ball_angles
+from ballpass.runtime.request.ball_angles import ball_angles
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum, whole_cycles
 
 TURN = 2.0 * np.pi
 INCH = 25.4e-3

@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import rosen, rosen_der
 
 from ballpass.runtime import Model, QuantityFunction, RequestError
-from ballpass.runtime.ask.bundle import BundleMinimum, Plane, minimize_by_planes, seen_from_both_sides
-from ballpass.runtime.ask.interior_point import minimize_by_ipopt
 from ballpass.runtime.ask.limits import read_limits
-from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
+from ballpass.runtime.search.bundle import BundleMinimum, Plane, minimize_by_planes, seen_from_both_sides
+from ballpass.runtime.search.interior_point import minimize_by_ipopt
+from ballpass.runtime.search.sequential_programs import minimize_by_slsqp
 
 CLEARANCE = "bearing.clearance=0 um:10 um"
 

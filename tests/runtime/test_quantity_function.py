@@ -31,7 +31,7 @@ from ballpass.runtime.certify import derivative_runs
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.run.request import Request
+from ballpass.runtime.request.request import Request
 
 CLEARANCE, MASS, ANGLE = "bearing.clearance", "mechanism.bodies.slider.mass", "mechanism.driver.start_angle"
 SPEED = "mechanism.driver.speed"

@@ -21,14 +21,14 @@ from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import End, Outcome, Stepper
+from ballpass.runtime.request.locating import stepper_for
+from ballpass.runtime.request.magnitudes import stepper_magnitudes
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import resolve
+from ballpass.runtime.request.segments import make_segments, segment_edges, time_resolution
 from ballpass.runtime.run import limits, loop
-from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import KeptSteps, RunFailed, RunUnderWay, Samples, segments_of, start_run
-from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import resolve
-from ballpass.runtime.run.segments import make_segments, segment_edges, time_resolution
 from ballpass.runtime.time import timeline
 
 ModelMaker = Callable[..., Model]

@@ -15,8 +15,8 @@ from test_simulate import exact
 
 from ballpass.runtime import IntegrationError, Model, RequestError, Status, load_solution, read_manifest
 from ballpass.runtime.ask.observables import statistics
-from ballpass.runtime.ask.spectrum import amplitude_spectrum
 from ballpass.runtime.native.kernel import Loop
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum
 
 ModelMaker = Callable[..., Model]
 
@@ -231,7 +231,7 @@ def test_derivatives_do_not_depend_on_how_a_run_is_cut_into_calls(
     name = "mechanism.forces.punch.window.start"
     whole = model.sensitivities(name, cycles=3, rtol=1e-8)
     for segments in (1, 2, 4):  # edges of a turn: punch on, punch off, turn
-        monkeypatch.setattr("ballpass.runtime.run.segments.SEGMENTS_A_CALL", segments)
+        monkeypatch.setattr("ballpass.runtime.request.segments.SEGMENTS_A_CALL", segments)
         cut = model.sensitivities(name, cycles=3, rtol=1e-8)
         scale = np.max(np.abs(whole.x), axis=(0, 2))[:, None]
         assert np.max(np.abs(cut.x - whole.x) / scale) < 1e-3

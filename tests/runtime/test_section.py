@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask.invariant_curve import fit_curve
+from ballpass.runtime.motion.invariant_curve import fit_curve
 from ballpass.runtime.questions.section import ON_CURVE
 
 

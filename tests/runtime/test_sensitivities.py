@@ -17,7 +17,7 @@ from ballpass.runtime import IntegrationError, Model, RequestError, Sensitivitie
 from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native.stepper import End, Outcome, Segments
 from ballpass.runtime.point.evaluate import neighbour
-from ballpass.runtime.run.direction_scales import direction_scales
+from ballpass.runtime.request.direction_scales import direction_scales
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.time import timeline
 

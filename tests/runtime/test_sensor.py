@@ -11,9 +11,9 @@ import pytest
 from scipy import signal as scipy_signal
 
 from ballpass.runtime import Model, RequestError, Sensor, SignalClass, Signals, make_data_set
-from ballpass.runtime.ask.spectrum import power_spectrum
-from ballpass.runtime.ask.vibration import amplitude_spectrum, envelope, kurtogram
-from ballpass.runtime.run.sensor import sensor_of_text
+from ballpass.runtime.vibration.diagnosis import amplitude_spectrum, envelope, kurtogram
+from ballpass.runtime.vibration.sensor import sensor_of_text
+from ballpass.runtime.vibration.spectrum import power_spectrum
 
 RATE = 200e3
 T = np.arange(40000) / RATE

@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.run.settle import LEAST, MEANS, PEAKS
+from ballpass.runtime.solution.settle import LEAST, MEANS, PEAKS
 
 ANGLE = "bearing.ball_angle"
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "punching_press.toml"

@@ -12,9 +12,9 @@ from scipy.stats import norm, sobol_indices, uniform
 from scipy.stats.qmc import Sobol
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask import drawn_members
-from ballpass.runtime.ask.variance_shares import VarianceShare, variance_shares, wilson
 from ballpass.runtime.questions.sobol import _interval
+from ballpass.runtime.shares import drawn_members
+from ballpass.runtime.shares.variance_shares import VarianceShare, variance_shares, wilson
 
 CLEARANCE = "bearing.clearance"
 

@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from quick_cases import long_but
 
 from ballpass.runtime import Model, Solution
-from ballpass.runtime.ask.spectrum import amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.motion import shown_range
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum
 
 matplotlib.use("agg")
 

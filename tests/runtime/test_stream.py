@@ -12,9 +12,9 @@ import xarray
 
 from ballpass.runtime import Model, RequestError, load_solution
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.run import request
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.stream import stream_run
+from ballpass.runtime.request import request
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.solution.stream import stream_run
 
 
 def test_a_streamed_run_has_the_samples_of_one_run(rotor: Model, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from ballpass.runtime.report.html import table_html
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.text import show, table_text
-from ballpass.runtime.run.settle import look_further
+from ballpass.runtime.solution.settle import look_further
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 

@@ -13,11 +13,11 @@ from scipy import signal as scipy_signal
 from ballpass.derive import SceneError, read_scene
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.summary import summarize
-from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
-from ballpass.runtime.ask.vibration import diagnosis, envelope, order_spectrum, spectrogram
 from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, mean_speeds, name_of
 from ballpass.runtime.questions.spectrum import spectrum
 from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
+from ballpass.runtime.vibration.diagnosis import diagnosis, envelope, order_spectrum, spectrogram
+from ballpass.runtime.vibration.spectrum import amplitude_spectrum, power_spectrum
 
 TURN = 2.0 * np.pi
 RATE = 8192.0

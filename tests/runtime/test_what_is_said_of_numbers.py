@@ -17,8 +17,8 @@ from ballpass.runtime.certify.error_target import TargetMissed, meet_target
 from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, stepper_run
 from ballpass.runtime.contract.bounds import outside
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.request.request import Request
 from ballpass.runtime.run.loop import RunFailed
-from ballpass.runtime.run.request import Request
 
 COUNT = int(os.environ.get("BALLPASS_SAID", "3"))
 

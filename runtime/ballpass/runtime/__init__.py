@@ -46,15 +46,15 @@ if TYPE_CHECKING:
     from ballpass.runtime.point.linearize import Linearization as Linearization
     from ballpass.runtime.point.linearize import Mode as Mode
     from ballpass.runtime.point.slopes import KinkWarning as KinkWarning
-    from ballpass.runtime.run.integration_error import IntegrationError as IntegrationError
+    from ballpass.runtime.request.start import RunEnd as RunEnd
     from ballpass.runtime.run.reductions import Reduction as Reduction
     from ballpass.runtime.run.reductions import Reductions as Reductions
-    from ballpass.runtime.run.sensitivity import Sensitivities as Sensitivities
-    from ballpass.runtime.run.sensor import Sensor as Sensor
-    from ballpass.runtime.run.solution import Solution as Solution
-    from ballpass.runtime.run.solution import Statistics as Statistics
-    from ballpass.runtime.run.solution_file import load_solution as load_solution
-    from ballpass.runtime.run.start import RunEnd as RunEnd
+    from ballpass.runtime.solution.integration_error import IntegrationError as IntegrationError
+    from ballpass.runtime.solution.sensitivity import Sensitivities as Sensitivities
+    from ballpass.runtime.solution.solution import Solution as Solution
+    from ballpass.runtime.solution.solution import Statistics as Statistics
+    from ballpass.runtime.solution.solution_file import load_solution as load_solution
+    from ballpass.runtime.vibration.sensor import Sensor as Sensor
 
 #: Public names, and the modules that have them.
 _HOME = {
@@ -96,15 +96,15 @@ _HOME = {
     "KinkWarning": "point.slopes",
     "Linearization": "point.linearize",
     "Mode": "point.linearize",
-    "IntegrationError": "run.integration_error",
+    "IntegrationError": "solution.integration_error",
     "Reduction": "run.reductions",
     "Reductions": "run.reductions",
-    "Sensitivities": "run.sensitivity",
-    "Sensor": "run.sensor",
-    "Solution": "run.solution",
-    "Statistics": "run.solution",
-    "load_solution": "run.solution_file",
-    "RunEnd": "run.start",
+    "Sensitivities": "solution.sensitivity",
+    "Sensor": "vibration.sensor",
+    "Solution": "solution.solution",
+    "Statistics": "solution.solution",
+    "load_solution": "solution.solution_file",
+    "RunEnd": "request.start",
 }
 __all__ = sorted(_HOME.keys() - {"__version__"})
 

@@ -33,19 +33,19 @@ from ballpass.runtime.quantity.passages import passing_times
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.questions import Questions
 from ballpass.runtime.report.digits import further, uncertainty
-from ballpass.runtime.run.choose_method import method_names
-from ballpass.runtime.run.locating import Kinks, refuse_with_error
+from ballpass.runtime.request.choose_method import method_names
+from ballpass.runtime.request.locating import Kinks, refuse_with_error
+from ballpass.runtime.request.request import Request
 from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.sensitivity import Sensitivities, sensitivities
-from ballpass.runtime.run.settle import MOST, Settled, settle
-from ballpass.runtime.run.simulate import simulate
-from ballpass.runtime.run.stream import stream_run
 from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.solution.sensitivity import Sensitivities, sensitivities
+from ballpass.runtime.solution.settle import MOST, Settled, settle
+from ballpass.runtime.solution.simulate import simulate
+from ballpass.runtime.solution.stream import stream_run
 
 if TYPE_CHECKING:
-    from ballpass.runtime.run.solution import Solution, Statistics
+    from ballpass.runtime.solution.solution import Solution, Statistics
 
 
 @typed
@@ -203,7 +203,7 @@ class Model(PointModel, Questions):
         parameters : overrides of parameters, SI
         method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
             ``cvodes``
-        rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.magnitudes`)
+        rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.request.magnitudes`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
             the run ends at the last one.  The stepper takes the same steps for any samples of a run of one length;
@@ -279,7 +279,7 @@ class Model(PointModel, Questions):
         kinks: Kinks | None = None,
         progress: Progress = None,
     ) -> Statistics:
-        """Simulate into a file, in memory that does not grow with the run (see `ballpass.runtime.run.stream`).
+        """Simulate into a file, in memory that does not grow with the run (see `ballpass.runtime.solution.stream`).
 
         Parameters are those of `simulate`.
 
@@ -339,9 +339,9 @@ class Model(PointModel, Questions):
         wrt : names of parameters; any number in one pass
         rtol : error allowed per step in the states.  Default: 1e-11, because derivatives lose digits
         sensitivity_rtol : the same in the derivatives, which take part in the choice of step sizes, relative to the
-            states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to the derivative itself where
-            it is larger.  Default: ten times `rtol`; where steps would fall below the resolution of time ten times as
-            much, and so on up to 1e-6: see `Sensitivities.sensitivity_rtol`
+            states' magnitudes over the parameters' scales (`request/direction_scales.py`) or to the derivative itself
+            where it is larger.  Default: ten times `rtol`; where steps would fall below the resolution of time ten
+            times as much, and so on up to 1e-6: see `Sensitivities.sensitivity_rtol`
         kinks : ``located``, the default, at any tolerance; ``stepped-over`` costs digits
         others : as for `simulate`
 
@@ -499,7 +499,7 @@ class Model(PointModel, Questions):
         most: int = MOST,
         progress: Progress = None,
     ) -> Settled:
-        """Reduce a run of as many turns as its extremes and rms take to settle (see `ballpass.runtime.run.settle`).
+        """Reduce a run of as many turns as its extremes and rms take to settle (`solution/settle.py`).
 
         Parameters are those of `reduce`.
 

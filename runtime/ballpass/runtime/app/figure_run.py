@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from ballpass.runtime.quantity.characteristic import turns_to_separate
-from ballpass.runtime.run.settle import repeats
+from ballpass.runtime.solution.settle import repeats
 from ballpass.runtime.time.timeline import driver
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
-    from ballpass.runtime.run.locating import Kinks
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.request.locating import Kinks
+    from ballpass.runtime.solution.solution import Solution
 
 #: Turns that are dropped before those of the figures.
 SETTLE = 20

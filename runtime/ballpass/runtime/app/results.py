@@ -19,9 +19,9 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import file_digest
 from ballpass.runtime.contract.folders import read_whole, replace_files
 from ballpass.runtime.report.plain import json_text
-from ballpass.runtime.run.solution import Solution
-from ballpass.runtime.run.solution_file import read_bytes
 from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.solution.solution import Solution
+from ballpass.runtime.solution.solution_file import read_bytes
 
 SOLUTION = "solution.nc"
 SUMMARY = "summary.json"

@@ -40,7 +40,7 @@ from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.failure_location import ring_distances
-from ballpass.runtime.run.settle import MEANS, PEAKS
+from ballpass.runtime.solution.settle import MEANS, PEAKS
 from ballpass.runtime.time.timeline import cycle_turns
 from ballpass.runtime.time.turning import TURN
 
@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from ballpass.runtime.ask.observables import SignalStatistics
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.reductions import Reduction
-    from ballpass.runtime.run.settle import Settled
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.settle import Settled
+    from ballpass.runtime.solution.solution import Solution
 
 #: Packages whose version may change a number.
 _TOOLS = ("casadi", "numpy", "scipy")

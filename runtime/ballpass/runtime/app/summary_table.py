@@ -20,7 +20,7 @@ from ballpass.runtime.report.report import ReportTable
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
-    from ballpass.runtime.run.accuracy import Accuracy
+    from ballpass.runtime.solution.accuracy import Accuracy
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")

@@ -16,16 +16,16 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.beats import beats
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats, tolerated
+from ballpass.runtime.request.beats import beats
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
+from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats, tolerated
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.timeline import cycle_turns
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
-    from ballpass.runtime.run.settle import Settled
+    from ballpass.runtime.solution.settle import Settled
 
 #: Channels that a warning names.
 SHOWN = 4

@@ -1,1 +1,1 @@
-"""Quantities of interest of a run: names, values, derivatives."""
+"""What several questions share: ranges and limits as they are written, parts kept on disk, true peaks, statistics."""

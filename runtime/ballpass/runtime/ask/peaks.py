@@ -25,9 +25,9 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.request.locating import LOCATED, STEPPED_OVER
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import Span
 

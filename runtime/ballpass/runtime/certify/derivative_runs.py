@@ -14,15 +14,15 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run.choose_method import STIFF_RATIO, differentiating_method
-from ballpass.runtime.run.locating import kinks_with_derivatives
-from ballpass.runtime.run.magnitudes import model_scales
+from ballpass.runtime.request.choose_method import STIFF_RATIO, differentiating_method
+from ballpass.runtime.request.locating import kinks_with_derivatives
+from ballpass.runtime.request.magnitudes import model_scales
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import SCALED_TURNS, Run, asked_span, resolve
+from ballpass.runtime.request.segments import check_count
+from ballpass.runtime.request.start import start_state
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import SCALED_TURNS, Run, asked_span, resolve
-from ballpass.runtime.run.segments import check_count
-from ballpass.runtime.run.sensitivity import loosened
-from ballpass.runtime.run.start import start_state
+from ballpass.runtime.solution.sensitivity import loosened
 from ballpass.runtime.time import timeline
 
 #: Growth of a change of the start below which a motion is not chaotic: one of 1e-10 (`growth.TINY`) then changes the

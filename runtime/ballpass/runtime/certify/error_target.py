@@ -32,13 +32,13 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.accuracy import Accuracy
-from ballpass.runtime.run.locating import LOCATED
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import check_count
-from ballpass.runtime.run.simulate import simulate
-from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.request.locating import LOCATED
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.request.segments import check_count
+from ballpass.runtime.solution.accuracy import Accuracy
+from ballpass.runtime.solution.simulate import simulate
+from ballpass.runtime.solution.solution import Solution
 
 #: Ways from loose to tight, and the error that each usually keeps [1].  The last one only checks.
 LADDER: tuple[tuple[MethodChoice, float], ...] = (

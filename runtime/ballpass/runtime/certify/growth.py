@@ -22,10 +22,10 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.report.digits import TIGHTER
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.locating import choose_kinks
+from ballpass.runtime.request.locating import choose_kinks
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.show.short import ShortRepr
 
 #: Relative change of a number that four printed digits do not bear [1].

@@ -24,9 +24,9 @@ from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run.locating import LOCATED
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.request.locating import LOCATED
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.request.locating import LOCATED, STEPPED_OVER, Kinks
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

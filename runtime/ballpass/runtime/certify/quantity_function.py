@@ -35,9 +35,9 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Estimate
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, check_kinks, refuse_jumps
-from ballpass.runtime.run.request import tolerance
-from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.request.locating import STEPPED_OVER, Kinks, check_kinks, refuse_jumps
+from ballpass.runtime.request.request import tolerance
+from ballpass.runtime.request.resolve import resolve
 from ballpass.runtime.show.progress import shown, shown_steps
 
 Array = NDArray[np.float64]

@@ -49,10 +49,10 @@ from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, Quantity
 from ballpass.runtime.quantity.records import Estimate, Quantity
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
-from ballpass.runtime.run.direction_scales import ANGLE
-from ballpass.runtime.run.locating import check_kinks, refuse_jumps
-from ballpass.runtime.run.request import Request, asked_length, tolerance
-from ballpass.runtime.run.resolve import Run, asked_transient
+from ballpass.runtime.request.direction_scales import ANGLE
+from ballpass.runtime.request.locating import check_kinks, refuse_jumps
+from ballpass.runtime.request.request import Request, asked_length, tolerance
+from ballpass.runtime.request.resolve import Run, asked_transient
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN, past
 

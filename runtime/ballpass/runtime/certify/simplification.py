@@ -26,7 +26,7 @@ from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.quantity.grammar import quantity_words
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.request import Request
+from ballpass.runtime.request.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
 

@@ -27,9 +27,9 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.quantity.grammar import quantity_words
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.run.locating import LOCATED, has_kinks
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.request.locating import LOCATED, has_kinks
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.show.progress import Progress, shown
 
 #: The reference and the method that checks it.

@@ -13,7 +13,7 @@ from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.locating import LOCATED
+from ballpass.runtime.request.locating import LOCATED
 from ballpass.runtime.show.short import ShortRepr
 
 #: Usual target errors [1].

@@ -16,9 +16,9 @@ from ballpass.runtime.certify.growth import Growth, by_moved_start
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.manifest import RunInfo
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.settle import repeats
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
+from ballpass.runtime.solution.settle import repeats
 from ballpass.runtime.time import timeline
 
 #: How far the rings are moved at the start, in their magnitudes [1]: what a start at rest is off by.

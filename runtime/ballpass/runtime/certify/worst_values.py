@@ -12,13 +12,13 @@ from functools import partial
 import numpy as np
 from scipy.stats.qmc import Halton
 
-from ballpass.runtime.ask.bundle import BundleMinimum, Plane
 from ballpass.runtime.ask.kept_parts import KeptParts
 from ballpass.runtime.ask.limits import Limit
 from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.certify.quantity_function import QuantityFunction
 from ballpass.runtime.contract.defaults import OPTIMUM_RTOL
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.search.bundle import BundleMinimum, Plane
 
 #: Points within the tolerances, beside their corners, of which the worst is taken; further ones that check it.
 WITHIN, FURTHER = 15, 256

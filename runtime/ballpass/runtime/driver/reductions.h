@@ -579,7 +579,7 @@ static void bp_rank_cuts(bp_cuts *cuts, const bp_within *step, int row, const do
 }
 
 /* Tolerance of a run up to which steps are cut at the corners of the most loaded ball: at looser ones what a corner costs is of the size of
-   the run's own error, and a cut step takes twice as long.  Kinks are located from there on (run/locating.py). */
+   the run's own error, and a cut step takes twice as long.  Kinks are located from there on (request/locating.py). */
 static const double BP_CUT_BELOW = 3e-7;
 
 /* Whether moments of a channel are wanted between its corners. */

@@ -1,4 +1,4 @@
-/* Magnitudes of the states of a run, from its most loaded moments, as in ballpass.runtime.run.magnitudes, for one member after another. */
+/* Magnitudes of the states of a run, from its most loaded moments, as in ballpass.runtime.request.magnitudes, for one member after another. */
 #ifndef BALLPASS_SCALES_H
 #define BALLPASS_SCALES_H
 

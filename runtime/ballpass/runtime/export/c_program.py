@@ -35,7 +35,7 @@ from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
-from ballpass.runtime.run.locating import has_kinks
+from ballpass.runtime.request.locating import has_kinks
 
 #: Flags of the compiler for a shared library, or replaced here.
 _LIBRARY_ONLY = ("-O1", "-fPIC", "-shared")

@@ -49,7 +49,7 @@ from ballpass.runtime.export.scene_numbers import (
 from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.magnitudes import model_scales
+from ballpass.runtime.request.magnitudes import model_scales
 from ballpass.runtime.time.timeline import stretch
 
 #: C of the interface, the standard's headers, and the licence of both.

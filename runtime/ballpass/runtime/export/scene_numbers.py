@@ -16,7 +16,7 @@ from ballpass.runtime.contract.manifest import Manifest, MarginInfo, TurningInfo
 from ballpass.runtime.contract.method_registry import METHODS, STEPPERS
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.locating import has_kinks, tight_below
+from ballpass.runtime.request.locating import has_kinks, tight_below
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.timeline import speed_name
 

@@ -23,10 +23,10 @@ from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, Mem
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import is_void, void_moment
 from ballpass.runtime.native.stepper import End
+from ballpass.runtime.request.locating import Kinks
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.limits import brief_limit
-from ballpass.runtime.run.locating import Kinks
 from ballpass.runtime.run.loop import STATUS_OF_END, ReductionRow, RunFailed, RunUnderWay
-from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.time.span import Span
 from ballpass.runtime.time.timeline import driver
 

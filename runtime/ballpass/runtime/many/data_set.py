@@ -51,7 +51,7 @@ from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, 
 from ballpass.runtime.many.spall_entries import driven_spalls, entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import quantities_of, quantity_words
-from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 

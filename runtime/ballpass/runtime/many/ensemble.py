@@ -37,11 +37,11 @@ from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.choose_method import choose_method
-from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.request.choose_method import choose_method
+from ballpass.runtime.request.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.request.request import asked_length, check_memory
+from ballpass.runtime.request.request import tolerance as relative_tolerance
 from ballpass.runtime.run.loop import RunFailed
-from ballpass.runtime.run.request import asked_length, check_memory
-from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import MOST_TIME, MOST_TURNS, Span, check_transient
 from ballpass.runtime.time.turning import TURN

@@ -14,9 +14,9 @@ import numpy as np
 from ballpass.runtime.many.members import Members, Spans
 from ballpass.runtime.native.ensemble_driver import MemberArrays
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.request import check_memory
-from ballpass.runtime.run.resolve import SCALED_TURNS
-from ballpass.runtime.run.segments import TURNED, TURNS_A_SEARCH, WORK
+from ballpass.runtime.request.request import check_memory
+from ballpass.runtime.request.resolve import SCALED_TURNS
+from ballpass.runtime.request.segments import TURNED, TURNS_A_SEARCH, WORK
 
 #: Windows of `TURNS_A_SEARCH` turns that edges are sought in at a time, over all members of a chunk: about a second's
 #: work.
@@ -71,7 +71,7 @@ def stretches(model: LoadedModel, members: Members, span: Spans, which: np.ndarr
 def moments(
     model: LoadedModel, members: Members, span: Spans, which: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The moments that `ballpass.runtime.run.magnitudes` uses, as for a single run with reductions.
+    """The moments that `ballpass.runtime.request.magnitudes` uses, as for a single run with reductions.
 
     Returns
     -------

@@ -26,13 +26,13 @@ from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, r
 from ballpass.runtime.quantity.passages import entering_times
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.run.integration_error import IntegrationError
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
-from ballpass.runtime.run.sensor import Sensor
-from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
+from ballpass.runtime.solution.integration_error import IntegrationError
+from ballpass.runtime.solution.simulate import simulate
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import Span
+from ballpass.runtime.vibration.sensor import Sensor
 
 #: Ways to store samples.
 PRECISIONS = ("float32", "float64")
@@ -251,7 +251,7 @@ def check_outputs(manifest: Manifest, signals: Signals, label: str, model: Loade
     RequestError
         All faults at once.
     """
-    from ballpass.runtime.run.request import no_output
+    from ballpass.runtime.request.request import no_output
 
     infos = {info.name: info for info in manifest.outputs}
     faults = []

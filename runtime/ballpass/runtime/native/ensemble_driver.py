@@ -190,7 +190,7 @@ class EnsembleDriver:
         inputs: np.ndarray,
         horizons: np.ndarray,
     ) -> np.ndarray:
-        """Magnitudes of the states of each member (see `ballpass.runtime.run.magnitudes`), shape (members, states).
+        """Magnitudes of the states of each member (see `ballpass.runtime.request.magnitudes`), shape (members, states).
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """Segments of many members at once, by C of `driver/schedule.c`, which exported programs have as well.
 
 In: parameters and constants of members, their spans.  Out: ends of segments, the inputs that hold in them, and those at
-the moments that magnitudes are taken from.  `ballpass.runtime.run.segments` finds the same for one run, to the last
+the moments that magnitudes are taken from.  `ballpass.runtime.request.segments` finds the same for one run, to the last
 bit, and needs no compiler.
 """
 

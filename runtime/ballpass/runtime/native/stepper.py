@@ -325,7 +325,7 @@ class Stepper:
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
     ) -> np.ndarray:
-        """Magnitudes of the states of a run (see `ballpass.runtime.run.magnitudes`), shape (states,).
+        """Magnitudes of the states of a run (see `ballpass.runtime.request.magnitudes`), shape (states,).
 
         The library that locates kinks has none: they are those of the plain one.
 

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.animate import animation_page, write_animation
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.show import html
+from ballpass.runtime.vibration.spectrum import Window, amplitude_spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.plot.record import Record
     from ballpass.runtime.point.point_model import PointModel
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
 
 #: Most lines of a legend, and names on an axis.
 _LEGEND, _NAMED = 12, 3
@@ -128,7 +128,7 @@ class SolutionPlot:
         Parameters
         ----------
         name : default: the displacement of the inner ring along x
-        window : see `ballpass.runtime.ask.spectrum`
+        window : see `ballpass.runtime.vibration.spectrum`
 
         Raises
         ------

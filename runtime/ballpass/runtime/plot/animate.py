@@ -16,7 +16,7 @@ from ballpass.runtime.plot.record import Record, bearing_named, gather
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
 
 
 def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0, bearing: str | None = None) -> str:

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.ask.continuation import KINDS, SteadyBranch
 from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.motion.continuation import KINDS, SteadyBranch
 from ballpass.runtime.plot.style import GREY, INK, MANY, SIGNAL, caption, label, new_figure, styled
 
 #: Markers of the points at which the kind of the states changes.

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.ask.elementary_effects import ElementaryEffect
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, MANY, caption, label, new_figure, styled
+from ballpass.runtime.shares.elementary_effects import ElementaryEffect
 
 
 @styled

@@ -20,7 +20,7 @@ from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
 
 
 def explore_page(model: PointModel, solution: Solution, *, units: Mapping[str, str] | None = None) -> str:

@@ -19,7 +19,7 @@ from ballpass.runtime.plot.style import write_figures
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.life_records import BearingStrength
+from ballpass.runtime.life.records import BearingStrength
 from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.plot.sweep import LUMINANCE
 from ballpass.runtime.ratings.elements import RATED

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
-from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.style import (
     APPLIED,
@@ -27,6 +26,7 @@ from ballpass.runtime.plot.style import (
     styled,
 )
 from ballpass.runtime.time.turning import past
+from ballpass.runtime.vibration.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 
 #: Points drawn between two samples where velocities are known: a resonance has only ten samples a period.
 _FINER = 8

@@ -19,14 +19,14 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
-from ballpass.runtime.run.ball_angles import ball_angles, ball_angles_along
+from ballpass.runtime.request.ball_angles import ball_angles, ball_angles_along
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, MechanismInfo
     from ballpass.runtime.point.point_model import PointModel
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.ask.invariant_curve import InvariantCurve
 from ballpass.runtime.contract.units import table_unit
+from ballpass.runtime.motion.invariant_curve import InvariantCurve
 from ballpass.runtime.plot.style import INK, SIGNAL, caption, label, new_figure, styled
 
 #: Points along the curve.

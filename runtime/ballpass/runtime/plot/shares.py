@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.ask.variance_shares import VarianceShare
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, INK, SIGNAL, caption, label, new_figure, styled
+from ballpass.runtime.shares.variance_shares import VarianceShare
 
 
 @styled

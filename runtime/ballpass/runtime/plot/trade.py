@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ballpass.runtime.certify.trade_report import Measured, Trade
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, log_ticks, new_figure, styled
-from ballpass.runtime.run.locating import LOCATED
+from ballpass.runtime.request.locating import LOCATED
 
 #: Markers and colours of methods by turns; shapes tell them apart in grey as well, and open ones locate kinks.
 _STYLES = tuple(zip("osDp^vP*", (INK, SAND, SIGNAL, INK, GREY, SAND, SIGNAL, GREY), strict=True))

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
-from ballpass.runtime.ask.vibration import Spectrogram
 from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
 from ballpass.runtime.quantity.characteristic import CharacteristicLine
+from ballpass.runtime.vibration.diagnosis import Spectrogram
 
 #: Multiples of a characteristic frequency that are marked.
 MARKED = 5

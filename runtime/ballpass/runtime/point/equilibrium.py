@@ -3,7 +3,7 @@
 In: a model, numbers, an instant.  Out: a `StaticEquilibrium`.
 
 Everything is at rest: the balls stand where they are at that instant, and no damping force acts.  The search starts
-with concentric rings (`ballpass.runtime.run.equilibrium_newton`).
+with concentric rings (`ballpass.runtime.request.equilibrium_newton`).
 
 Derivatives are those of the implicit function: 0 = f(q(p), p) gives dq/dp = K^-1 df/dp with the stiffness K = -df/dq.
 """
@@ -31,7 +31,7 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.ratings.result_limits import void_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.equilibrium_newton import FIRST_STEP, SearchEnd, settle
+from ballpass.runtime.request.equilibrium_newton import FIRST_STEP, SearchEnd, settle
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import check_length
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, beside, past

@@ -29,7 +29,7 @@ from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
+from ballpass.runtime.request.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import past

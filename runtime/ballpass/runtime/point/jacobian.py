@@ -26,7 +26,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.run.request import on_request
+from ballpass.runtime.request.request import on_request
 from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]

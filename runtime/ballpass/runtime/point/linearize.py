@@ -31,7 +31,7 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.report.short_words import head_lines, names_in_words
-from ballpass.runtime.run.magnitudes import mass_matrix
+from ballpass.runtime.request.magnitudes import mass_matrix
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.run.start import RunEnd, Start
+from ballpass.runtime.request.start import RunEnd, Start
 
 #: State at the start: given, "equilibrium", or the end of a run that this one continues; None takes the scene's.
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None

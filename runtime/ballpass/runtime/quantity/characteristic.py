@@ -15,7 +15,7 @@ from fractions import Fraction
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
-from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 

@@ -24,8 +24,8 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.records import Kind, Quantity
 from ballpass.runtime.quantity.registry import ALSO, KINDS
 from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.request.request import no_output
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import no_output
 
 _Given = TypeVar("_Given")
 _Found = TypeVar("_Found")

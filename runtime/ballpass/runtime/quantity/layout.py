@@ -50,10 +50,10 @@ from ballpass.runtime.quantity.passages import EdgeDistances, JumpDistance, Pass
 from ballpass.runtime.quantity.records import Kind, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
-from ballpass.runtime.run.locating import LOCATED, stepper_for
+from ballpass.runtime.request.locating import LOCATED, stepper_for
+from ballpass.runtime.request.request import check_memory
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.loop import segments_of
-from ballpass.runtime.run.request import check_memory
-from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 

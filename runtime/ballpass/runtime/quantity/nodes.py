@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.stepper import Segments
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]

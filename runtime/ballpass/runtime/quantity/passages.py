@@ -21,10 +21,10 @@ from ballpass.runtime.quantity.kinks import crossings
 from ballpass.runtime.quantity.nodes import APART, Edges, fixed_nodes, make_edges, place
 from ballpass.runtime.quantity.panels import GAUSS, panels_between, plan_of
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow
+from ballpass.runtime.request.request import Request, check_memory
+from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.loop import segments_of, steps_of
-from ballpass.runtime.run.request import Request, check_memory
-from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 

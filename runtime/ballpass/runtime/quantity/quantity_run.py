@@ -42,11 +42,11 @@ from ballpass.runtime.quantity.passages import JumpDistance, jumps_at, jumps_at_
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.request.locating import stepper_for
+from ballpass.runtime.request.request import check_memory
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import KeptSteps, ReductionRow, Sink, start_run
-from ballpass.runtime.run.request import check_memory
-from ballpass.runtime.run.resolve import Run
 
 Array = NDArray[np.float64]
 

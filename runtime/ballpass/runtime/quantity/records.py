@@ -14,7 +14,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, MOMENTS, ReductionRows, reduction_rows
 from ballpass.runtime.quantity.nodes import Nodes
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.request.resolve import Run
 
 if TYPE_CHECKING:
     from ballpass.runtime.quantity.track import Signal

@@ -25,12 +25,12 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.quantity.nodes import Edges, Nodes, part_of_nodes
+from ballpass.runtime.request.locating import stepper_for
+from ballpass.runtime.request.request import no_output
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.request.segments import time_resolution
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import Samples, start_run
-from ballpass.runtime.run.request import no_output
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import time_resolution
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Chain

@@ -13,8 +13,8 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Estimate, Quantity
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import resolve
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import resolve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

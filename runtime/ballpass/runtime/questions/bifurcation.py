@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.ask.kept_parts import Arrays
-    from ballpass.runtime.ask.lyapunov import Exponent
     from ballpass.runtime.ask.parameter_range import ParameterRange
+    from ballpass.runtime.motion.lyapunov import Exponent
 
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
@@ -228,12 +228,12 @@ def bifurcation(
     >>> [motion.exponent.high < 0.0 for motion in found.up]
     [True, True]
     """
-    from ballpass.runtime.ask.forcing_period import refuse_free_driver
     from ballpass.runtime.ask.kept_parts import kept_parts
-    from ballpass.runtime.ask.lyapunov import kind_of_motion, largest_exponent
     from ballpass.runtime.ask.parameter_range import parameter_range
-    from ballpass.runtime.ask.strobe import strobe_of
-    from ballpass.runtime.run.locating import refuse_jumps
+    from ballpass.runtime.motion.forcing_period import refuse_free_driver
+    from ballpass.runtime.motion.lyapunov import kind_of_motion, largest_exponent
+    from ballpass.runtime.motion.strobe import strobe_of
+    from ballpass.runtime.request.locating import refuse_jumps
 
     manifest = model.manifest
     if exponent:
@@ -326,8 +326,8 @@ def _motion(
     each: Callable[[], None],
 ) -> Arrays:
     """The motion from a state on: readings, their derivatives by those before, if any, and magnitudes."""
-    from ballpass.runtime.ask.lyapunov import strobe_with_tangents
-    from ballpass.runtime.run.start import state_at
+    from ballpass.runtime.motion.lyapunov import strobe_with_tangents
+    from ballpass.runtime.request.start import state_at
     from ballpass.runtime.time.timeline import alike_from
 
     count = max(settling, 1) if exponent else settling + readings

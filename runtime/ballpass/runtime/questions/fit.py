@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from ballpass.runtime.ask.fit_report import FitAnswer, FittedNumber, FittedSignal
 from ballpass.runtime.contract.defaults import FIT_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, RecordedRate, Rtol, TimeColumn, Transient
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
+from ballpass.runtime.fit.report import FitAnswer, FittedNumber, FittedSignal
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.show.progress import Progress, shown
@@ -21,9 +21,9 @@ from ballpass.runtime.show.progress import Progress, shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.fitting import Fitted
-    from ballpass.runtime.ask.misfit import Misfit
     from ballpass.runtime.ask.parameter_range import ParameterRange
+    from ballpass.runtime.fit.least_squares import Fitted
+    from ballpass.runtime.fit.misfit import Misfit
 
 #: Distance of each start from the bounds, in shares of the range [1].
 INSIDE = 0.05
@@ -164,12 +164,12 @@ def fit(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.fitting import best_of, fit_unknowns
     from ballpass.runtime.ask.kept_parts import kept_parts
-    from ballpass.runtime.ask.measured import columns_by_output, read_trial
-    from ballpass.runtime.ask.misfit import Misfit
     from ballpass.runtime.ask.parameter_range import parameter_range
-    from ballpass.runtime.run.locating import refuse_jumps
+    from ballpass.runtime.fit.least_squares import best_of, fit_unknowns
+    from ballpass.runtime.fit.measured import columns_by_output, read_trial
+    from ballpass.runtime.fit.misfit import Misfit
+    from ballpass.runtime.request.locating import refuse_jumps
 
     refuse_jumps(model.manifest, "fit")
     texts = [vary] if isinstance(vary, str) else list(vary)
@@ -227,7 +227,7 @@ def _shift(text: str | None) -> ParameterRange | None:
 
 def _refuse_chaos(model: AnyModel, misfit: Misfit, fitted: Fitted) -> None:
     from ballpass.runtime.certify.growth import refuse_growth
-    from ballpass.runtime.run.request import Request
+    from ballpass.runtime.request.request import Request
 
     if not (model.states and model.has_stepper):
         return
@@ -247,8 +247,8 @@ def _answer(
     rtol: float,
 ) -> FitAnswer:
     """The answer from the best search."""
-    from ballpass.runtime.ask.fitting import profile_end
-    from ballpass.runtime.ask.undetermined import undetermined_groups
+    from ballpass.runtime.fit.least_squares import profile_end
+    from ballpass.runtime.fit.undetermined import undetermined_groups
 
     values = misfit.values(best.counts)
     groups = undetermined_groups(misfit, best)

@@ -16,9 +16,9 @@ from ballpass.runtime.show.progress import Progress, shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.life_records import BearingStrength
-    from ballpass.runtime.ask.life_text import LifeReport
     from ballpass.runtime.contract.manifest import BearingInfo
+    from ballpass.runtime.life.records import BearingStrength
+    from ballpass.runtime.life.text import LifeReport
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.point.run_start import Initial
 
@@ -88,9 +88,9 @@ def life(
     >>> f"{bearing.static_safety:.1f}, {bearing.life / 1e6:.0f} million turns"
     '0.9, 225 million turns'
     """
-    from ballpass.runtime.ask.life_report import life_report
+    from ballpass.runtime.life.report import life_report
     from ballpass.runtime.point.run_start import run_numbers, start_of
-    from ballpass.runtime.run.request import Request
+    from ballpass.runtime.request.request import Request
 
     numbers = run_numbers(model, parameters)
     request = Request(
@@ -111,12 +111,12 @@ def _pressure(
 
     Over the whole run where its turns are unlike each other.
     """
-    from ballpass.runtime.ask.wear import load_samples
+    from ballpass.runtime.life.wear import load_samples
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of
-    from ballpass.runtime.run.request import Request
-    from ballpass.runtime.run.resolve import resolve
-    from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.request.request import Request
+    from ballpass.runtime.request.resolve import resolve
+    from ballpass.runtime.solution.settle import repeats
     from ballpass.runtime.time.timeline import cycle_turns
 
     numbers = model.numbers(overrides)
@@ -140,7 +140,7 @@ def _clearance(
 ) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.solution.settle import repeats
     from ballpass.runtime.time.timeline import driver, whole_cycles
 
     name = f"{info.path}.clearance"

@@ -20,7 +20,7 @@ from ballpass.runtime.show.progress import Progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.elementary_effects import ElementaryEffect
+    from ballpass.runtime.shares.elementary_effects import ElementaryEffect
 
 Of = Annotated[
     str | Sequence[str],
@@ -77,7 +77,7 @@ class MorrisAnswer(DrawnAnswer):
     quantities: tuple[ScreenedQuantity, ...]
 
     def _report(self) -> Report:
-        from ballpass.runtime.ask.drawn_members import fault_of
+        from ballpass.runtime.shares.drawn_members import fault_of
 
         known = all(effect.rows >= 2 for one in self.quantities for effect in one.effects)
         parts, records = [], []
@@ -160,9 +160,9 @@ def morris(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_drawn, values_of
-    from ballpass.runtime.ask.elementary_effects import elementary_effects, moved
     from ballpass.runtime.quantity.grammar import quantities_of
+    from ballpass.runtime.shares.drawn_members import check_count, read_inputs, run_drawn, values_of
+    from ballpass.runtime.shares.elementary_effects import elementary_effects, moved
 
     inputs = read_inputs(model.manifest, "vary", vary)
     names = list(dict.fromkeys([of] if isinstance(of, str) else of))

@@ -27,9 +27,9 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.bundle import BundleMinimum
     from ballpass.runtime.ask.limits import Limit
     from ballpass.runtime.ask.parameter_range import ParameterRange
+    from ballpass.runtime.search.bundle import BundleMinimum
 
 #: Candidates for each start beside the corners of the ranges; they run in lanes.  Values of a sweep over one range.
 CANDIDATES, SWEPT = 8, 33
@@ -351,16 +351,16 @@ def optimize(
     """
     from scipy.stats.qmc import Halton
 
-    from ballpass.runtime.ask.bundle import BOX, minimize_by_planes, seen_from_both_sides
-    from ballpass.runtime.ask.interior_point import minimize_by_ipopt
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.limits import read_limits
     from ballpass.runtime.ask.parameter_range import parameter_range
-    from ballpass.runtime.ask.sequential_programs import minimize_by_slsqp
     from ballpass.runtime.certify.quantity_function import UnknownValueWarning
     from ballpass.runtime.certify.worst_values import WorstValues
     from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.quantity.grammar import quantities_of
+    from ballpass.runtime.search.bundle import BOX, minimize_by_planes, seen_from_both_sides
+    from ballpass.runtime.search.interior_point import minimize_by_ipopt
+    from ballpass.runtime.search.sequential_programs import minimize_by_slsqp
 
     ranges = tuple(parameter_range(model.manifest.parameters, "vary", text) for text in _texts(vary))
     box = tuple(

@@ -65,7 +65,7 @@ def ranges(*, counted: bool = False, deviations: bool = False) -> Reader:
 
 def distributions(manifest: Manifest | None, option: str, texts: Sequence[str]) -> None:
     """Parameters with distributions: ``bearing.clearance=norm:loc=10 um:scale=1 um``."""
-    from ballpass.runtime.ask.drawn_members import read_inputs
+    from ballpass.runtime.shares.drawn_members import read_inputs
 
     if manifest is not None:
         read_inputs(manifest, option, texts)
@@ -73,7 +73,7 @@ def distributions(manifest: Manifest | None, option: str, texts: Sequence[str]) 
 
 def outputs(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Outputs: ``inner.ax``."""
-    from ballpass.runtime.run.sampling import output_names
+    from ballpass.runtime.request.sampling import output_names
 
     if manifest is not None:
         output_names(manifest, texts)
@@ -96,7 +96,7 @@ def states(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> Non
 
 def measured(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Outputs that columns of measured data hold: ``outer.y=probe_2``."""
-    from ballpass.runtime.ask.measured import columns_by_output, measurable
+    from ballpass.runtime.fit.measured import columns_by_output, measurable
 
     columns = columns_by_output(texts)
     if manifest is not None:
@@ -105,7 +105,7 @@ def measured(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
 
 def measured_quantities(manifest: Manifest | None, option: str, sources: Sequence[Any]) -> None:
     """Quantities that rows of files of measured data name; a file that cannot be read is refused as well."""
-    from ballpass.runtime.ask.measured import quantities_in
+    from ballpass.runtime.fit.measured import quantities_in
 
     quantities(manifest, option, [name for source in sources for name in quantities_in(source)])
 
@@ -137,7 +137,7 @@ def bearings(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
 
 def kinks(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """What a run does at kinks."""
-    from ballpass.runtime.run.locating import check_kinks
+    from ballpass.runtime.request.locating import check_kinks
 
     for text in texts:
         check_kinks(text)
@@ -156,7 +156,7 @@ def methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
 
 def stepper_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Methods of the project's own stepper, of which every scene has the same."""
-    from ballpass.runtime.run.choose_method import stepper_method
+    from ballpass.runtime.request.choose_method import stepper_method
 
     for text in texts:
         stepper_method(text)
@@ -164,7 +164,7 @@ def stepper_methods(_manifest: Manifest | None, _option: str, texts: Sequence[st
 
 def differentiating_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
     """Methods that differentiate their own steps."""
-    from ballpass.runtime.run.choose_method import differentiating_method
+    from ballpass.runtime.request.choose_method import differentiating_method
 
     for text in texts:
         differentiating_method("sensitivity", text)

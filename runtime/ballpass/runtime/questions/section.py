@@ -31,7 +31,7 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.invariant_curve import InvariantCurve
+    from ballpass.runtime.motion.invariant_curve import InvariantCurve
 
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
@@ -238,11 +238,11 @@ def section(
     >>> bool(found.curve.missed.max() < 0.02)  # distance from it over the spread
     True
     """
-    from ballpass.runtime.ask.forcing_period import own_phases, refuse_free_driver
-    from ballpass.runtime.ask.invariant_curve import fit_curve
-    from ballpass.runtime.ask.lyapunov import period_of
-    from ballpass.runtime.ask.strobe import strobe_of
-    from ballpass.runtime.run.ball_angles import ball_angles
+    from ballpass.runtime.motion.forcing_period import own_phases, refuse_free_driver
+    from ballpass.runtime.motion.invariant_curve import fit_curve
+    from ballpass.runtime.motion.lyapunov import period_of
+    from ballpass.runtime.motion.strobe import strobe_of
+    from ballpass.runtime.request.ball_angles import ball_angles
     from ballpass.runtime.time.timeline import alike_from, cycle_turns
 
     manifest = model.manifest

@@ -25,7 +25,7 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.variance_shares import VarianceShare
+    from ballpass.runtime.shares.variance_shares import VarianceShare
 
 #: Differences below this share of a value are rounding [1].
 ROUNDING = 1e-12
@@ -142,7 +142,7 @@ class DrawnAnswer(ShortRepr, Reported):
     infinite: tuple[str, ...]
 
     def _warnings(self) -> list[str]:
-        from ballpass.runtime.ask.variance_shares import wilson
+        from ballpass.runtime.shares.variance_shares import wilson
 
         if not self.failed:
             return [*self.infinite]
@@ -186,8 +186,8 @@ class SobolAnswer(DrawnAnswer):
     values: np.ndarray
 
     def _report(self) -> Report:
-        from ballpass.runtime.ask.drawn_members import fault_of
-        from ballpass.runtime.ask.variance_shares import FEWEST
+        from ballpass.runtime.shares.drawn_members import fault_of
+        from ballpass.runtime.shares.variance_shares import FEWEST
 
         parts: list[Any] = []
         rows = []
@@ -312,10 +312,10 @@ def sobol(
     """
     from scipy.stats.qmc import Sobol
 
-    from ballpass.runtime.ask.drawn_members import check_count, read_inputs, run_drawn, values_of
     from ballpass.runtime.ask.limits import read_limits
-    from ballpass.runtime.ask.variance_shares import variance_shares, wilson
     from ballpass.runtime.quantity.grammar import quantities_of
+    from ballpass.runtime.shares.drawn_members import check_count, read_inputs, run_drawn, values_of
+    from ballpass.runtime.shares.variance_shares import variance_shares, wilson
 
     inputs = read_inputs(model.manifest, "vary", vary)
     texts = [limit] if isinstance(limit, str) else list(limit or [])

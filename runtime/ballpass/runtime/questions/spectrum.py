@@ -18,17 +18,17 @@ from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.sensor import Sensor, sensor_of_text
 from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.vibration.sensor import Sensor, sensor_of_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.vibration import DiagnosisStatistics
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.quantity.characteristic import CharacteristicLine
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
+    from ballpass.runtime.vibration.diagnosis import DiagnosisStatistics
 
 #: Bands of a kurtogram are so many times as wide as the fastest line at least: impacts stay apart in them.
 WIDTHS = 3.0
@@ -265,7 +265,7 @@ class SignalSpectrum(ShortRepr, Reported):
 
 def _lowest_reading(window: str) -> float:
     """Height that a sine of amplitude 1 has midway between two lines."""
-    from ballpass.runtime.ask.spectrum import window_weights
+    from ballpass.runtime.vibration.spectrum import window_weights
 
     weights = window_weights(window, SAMPLES)
     return float(abs(np.exp(1j * np.pi * np.arange(SAMPLES) / SAMPLES) @ weights) / np.sum(weights))
@@ -304,8 +304,8 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     what = f"envelope of {found.of}, {band[0]:g} to {band[1]:g} Hz" if band else found.of
     title = f"{solution.manifest.title}: {what}"
     if found.spectrogram:
-        from ballpass.runtime.ask.vibration import envelope, spectrogram
         from ballpass.runtime.quantity.characteristic import characteristic_lines, mean_speeds
+        from ballpass.runtime.vibration.diagnosis import envelope, spectrogram
 
         signal = solution[found.of]
         values = envelope(solution.t, signal, band) if band else signal
@@ -388,13 +388,13 @@ def spectrum(
     >>> model.spectrum("drive_torque", cycles=12, transient=2, orders=True, top=1).names
     ('shaft',)
     """
-    from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
-    from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
-    from ballpass.runtime.ask.vibration import envelope as envelope_of
-    from ballpass.runtime.ask.vibration import kurtogram as kurtogram_of
     from ballpass.runtime.quantity.characteristic import carries_lines, characteristic_lines, mean_speeds
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.solution.solution import Solution
     from ballpass.runtime.time.timeline import is_even
+    from ballpass.runtime.vibration.diagnosis import diagnosis, order_spectrum
+    from ballpass.runtime.vibration.diagnosis import envelope as envelope_of
+    from ballpass.runtime.vibration.diagnosis import kurtogram as kurtogram_of
+    from ballpass.runtime.vibration.spectrum import amplitude_spectrum, power_spectrum
 
     channel, notes, warnings = of or "", tuple[str, ...](), tuple[str, ...]()
     if recording is not None:
@@ -497,10 +497,10 @@ def _recorded(
     parameters: Mapping[str, float] | None,
 ) -> tuple[Solution, str, str, tuple[str, ...]]:
     """A recording in place of a run, its column, its unit, and words on how it was read."""
-    from ballpass.runtime.ask.measured import said_numbers
     from ballpass.runtime.contract.column_files import read_columns
     from ballpass.runtime.contract.status import Status
-    from ballpass.runtime.run.solution import Solution, Statistics
+    from ballpass.runtime.fit.measured import said_numbers
+    from ballpass.runtime.solution.solution import Solution, Statistics
     from ballpass.runtime.time.timeline import shaft_speed
     from ballpass.runtime.time.turning import TURN
 
@@ -552,7 +552,7 @@ def _recorded(
 
 def _measured(run: Solution, of: str, sensor: Sensor) -> np.ndarray:
     """A signal of a run as a sensor gives it; its noise is the same in every call."""
-    from ballpass.runtime.ask.spectrum import even_samples
+    from ballpass.runtime.vibration.spectrum import even_samples
 
     time, values = even_samples(run.t, run[of])
     rate = (len(time) - 1) / (time[-1] - time[0])
@@ -587,7 +587,7 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
     """Turns of a run that separates ball pass from the shaft; None for those of the scene, where turns differ."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
-    from ballpass.runtime.run.settle import repeats
+    from ballpass.runtime.solution.settle import repeats
     from ballpass.runtime.time.timeline import driver
 
     manifest, values = model.manifest, model.numbers(parameters).values

@@ -27,11 +27,11 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.contact_sequence import ContactSequence
-    from ballpass.runtime.ask.continuation import BranchPoint, SteadyBranch
     from ballpass.runtime.ask.parameter_range import ParameterRange
-    from ballpass.runtime.ask.shooting import PeriodicState, Shooting
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.motion.contact_sequence import ContactSequence
+    from ballpass.runtime.motion.continuation import BranchPoint, SteadyBranch
+    from ballpass.runtime.motion.shooting import PeriodicState, Shooting
+    from ballpass.runtime.solution.solution import Solution
 
 #: Difference of the accelerations at one state, a period apart, that a period of few digits has [1].
 SAME = 1e-3
@@ -155,7 +155,7 @@ class SteadyState(ShortRepr, Reported):
         >>> model.steady(parameters={"bearing.pitch_diameter": 31.75e-3}).kind
         'stable'
         """
-        from ballpass.runtime.ask.steady_report import kind_of
+        from ballpass.runtime.motion.steady_report import kind_of
 
         return kind_of(self.multipliers)
 
@@ -173,7 +173,7 @@ class SteadyState(ShortRepr, Reported):
         return f"; a transient takes {periods:.0f} periods to come as near" if periods > self.integrated else ""
 
     def _report(self) -> Report:
-        from ballpass.runtime.ask.steady_report import (
+        from ballpass.runtime.motion.steady_report import (
             branch_facts,
             branch_table,
             branch_words,
@@ -295,12 +295,12 @@ def steady(
     >>> found.states[0], found.start.shape
     ('inner.x', (8,))
     """
-    from ballpass.runtime.ask.contact_sequence import contact_sequence
-    from ballpass.runtime.ask.forcing_period import common_period, forcing_period, refuse_free_driver, sampled_turns
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.parameter_range import parameter_range
-    from ballpass.runtime.ask.shooting import Shooting
     from ballpass.runtime.contract.defaults import SENSITIVITY
+    from ballpass.runtime.motion.contact_sequence import contact_sequence
+    from ballpass.runtime.motion.forcing_period import common_period, forcing_period, refuse_free_driver, sampled_turns
+    from ballpass.runtime.motion.shooting import Shooting
     from ballpass.runtime.time.timeline import alike_from
 
     manifest = model.manifest
@@ -371,7 +371,7 @@ def _run(
 ) -> Solution:
     """A run without outputs over turns that are alike, from the scene's start if no state there is given, sampled at
     the ends of equal parts."""
-    from ballpass.runtime.run.start import state_at
+    from ballpass.runtime.request.start import state_at
     from ballpass.runtime.time.timeline import alike_from
 
     numbers = model.numbers(parameters)
@@ -452,8 +452,8 @@ def _branches(
     shooting: Shooting, found: PeriodicState, over: ParameterRange, tell: Callable[[float], None] | None
 ) -> tuple[tuple[SteadyBranch, ...], tuple[str, ...]]:
     """The branch of a state, and those of twice the period at its doublings, each once."""
-    from ballpass.runtime.ask.continuation import ENDS, MEETS, doubled, follow
-    from ballpass.runtime.ask.steady_report import early_end
+    from ballpass.runtime.motion.continuation import ENDS, MEETS, doubled, follow
+    from ballpass.runtime.motion.steady_report import early_end
 
     ends = (over.low, over.high)
     first = follow(shooting, found, ends[0], ends, progress=tell)

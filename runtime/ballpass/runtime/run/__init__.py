@@ -1,1 +1,1 @@
-"""A run over time: request, segments, inputs, steps, samples, reductions."""
+"""A run over time: steps of the compiled driver, what they are reduced to, and where one failed."""

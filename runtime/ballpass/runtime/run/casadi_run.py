@@ -13,7 +13,7 @@ from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native import casadi_integrators
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 

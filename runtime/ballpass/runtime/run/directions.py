@@ -16,9 +16,9 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments, Tangents
-from ballpass.runtime.run.direction_scales import direction_scales
-from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
-from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.request.direction_scales import direction_scales
+from ballpass.runtime.request.locating import STEPPED_OVER, Kinks, stepper_for
+from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import Turning
 
@@ -195,7 +195,7 @@ class Directions:
         Parameters
         ----------
         rtol : error allowed in a step, relative to the states' magnitudes over the parameters' scales (see
-            `ballpass.runtime.run.direction_scales`), or to the derivative itself where it is larger [1]
+            `ballpass.runtime.request.direction_scales`), or to the derivative itself where it is larger [1]
         magnitude : of the states, shape (states,)
         """
         self._rtol = rtol

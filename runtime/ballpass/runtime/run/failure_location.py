@@ -11,8 +11,8 @@ import numpy as np
 from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.run.ball_angles import ball_angles
-from ballpass.runtime.run.magnitudes import mass_matrix
+from ballpass.runtime.request.ball_angles import ball_angles
+from ballpass.runtime.request.magnitudes import mass_matrix
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import beside, past
 

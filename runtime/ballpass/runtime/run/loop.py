@@ -24,11 +24,11 @@ from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.reduction_rows import HEAD, void_moment
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
+from ballpass.runtime.request.locating import LOCATED, stepper_for
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.request.segments import SEGMENTS_A_CALL, joined_segments, rest_of, run_windows
 from ballpass.runtime.run.failure_location import FailureLocation, locate_failure, stall_words
 from ballpass.runtime.run.limits import allowance
-from ballpass.runtime.run.locating import LOCATED, stepper_for
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import SEGMENTS_A_CALL, joined_segments, rest_of, run_windows
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions

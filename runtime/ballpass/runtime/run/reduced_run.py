@@ -13,10 +13,10 @@ import numpy as np
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.run.loop import ReductionRow, RunUnderWay, start_run
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.resolve import Run, resolve
 
 
 def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:

@@ -15,10 +15,10 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
+from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.request.sampling import Sampling
+from ballpass.runtime.request.segments import check_count, time_resolution
 from ballpass.runtime.run.loop import segments_of
-from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.sampling import Sampling
-from ballpass.runtime.run.segments import check_count, time_resolution
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

@@ -17,7 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import read_file
 from ballpass.runtime.many.distributions import Distribution, plain_arguments
 from ballpass.runtime.many.signals import PRECISIONS, Signals
-from ballpass.runtime.run.sensor import Sensor, read_sensor
+from ballpass.runtime.vibration.sensor import Sensor, read_sensor
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene

@@ -312,7 +312,7 @@ def _source(
     """The scene's model or the run in a file, and numbers of ``--set``."""
     question = declared(ask)
     if question.takes_runs and scene.suffix == ".nc":
-        from ballpass.runtime.run.solution_file import load_solution
+        from ballpass.runtime.solution.solution_file import load_solution
 
         if set_:
             raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")

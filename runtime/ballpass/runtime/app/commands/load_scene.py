@@ -173,7 +173,7 @@ def read_with_settings(
     from ballpass.derive import SceneError, read_scene
     from ballpass.derive.reading.read import parse_override, with_values
     from ballpass.derive.scene.errors import Fault
-    from ballpass.runtime.run.request import refuse_two_lengths
+    from ballpass.runtime.request.request import refuse_two_lengths
 
     read = read_scene(path)
     faults: list[Fault] = []

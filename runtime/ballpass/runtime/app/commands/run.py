@@ -43,10 +43,10 @@ if TYPE_CHECKING:
     from ballpass.runtime.app.summary import Turned
     from ballpass.runtime.model import Model
     from ballpass.runtime.report.report import Report, ReportTable, Words
-    from ballpass.runtime.run.locating import Kinks
-    from ballpass.runtime.run.settle import Settled
-    from ballpass.runtime.run.solution import Solution
-    from ballpass.runtime.run.start import RunEnd
+    from ballpass.runtime.request.locating import Kinks
+    from ballpass.runtime.request.start import RunEnd
+    from ballpass.runtime.solution.settle import Settled
+    from ballpass.runtime.solution.solution import Solution
 
 Of = Annotated[
     Sequence[str] | None,
@@ -151,7 +151,7 @@ def run(
         from ballpass.runtime.app.transient_words import tables_left_out
         from ballpass.runtime.plot import CAPTIONS
         from ballpass.runtime.report.text import show as show_report
-        from ballpass.runtime.run.locating import LOCATED, refuse_with_error
+        from ballpass.runtime.request.locating import LOCATED, refuse_with_error
 
         stages("read")
         formats = read_formats(format_)
@@ -260,7 +260,7 @@ def _answer(
     from ballpass.runtime.app.transient_words import transient_words
     from ballpass.runtime.ask.peaks import run_of
     from ballpass.runtime.report.report import Report
-    from ballpass.runtime.run.settle import look_further
+    from ballpass.runtime.solution.settle import look_further
 
     taken, said = solution.statistics, list[str]()
     numbers = model.numbers(given["parameters"])
@@ -300,7 +300,7 @@ def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
         return None
     if text == "equilibrium":
         return "equilibrium"
-    from ballpass.runtime.run.solution_file import load_solution
+    from ballpass.runtime.solution.solution_file import load_solution
 
     return load_solution(text).end
 

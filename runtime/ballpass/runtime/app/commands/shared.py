@@ -340,7 +340,7 @@ def load_model(
     from ballpass.runtime.contract.method_registry import STEPPERS
     from ballpass.runtime.model import load, load_own
     from ballpass.runtime.native.compilers import need_compiler
-    from ballpass.runtime.run.locating import choose_kinks, stepper_for
+    from ballpass.runtime.request.locating import choose_kinks, stepper_for
 
     if asked.integrated and (needs or method in STEPPERS):
         need_compiler(needs or f"method {method}")

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.runtime.app.commands.sweep_results import Sweep
     from ballpass.runtime.contract.manifest import Manifest
-    from ballpass.runtime.run.locating import Kinks
+    from ballpass.runtime.request.locating import Kinks
 
 Of = Annotated[
     Sequence[str] | None,

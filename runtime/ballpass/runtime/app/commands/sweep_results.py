@@ -24,7 +24,7 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
 from ballpass.runtime.report.short_words import head_lines
-from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
+from ballpass.runtime.solution.netcdf import Variable, netcdf_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

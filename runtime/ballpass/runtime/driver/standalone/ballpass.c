@@ -14,7 +14,7 @@
 #include "stepper.h"
 
 /* Segments of one call. */
-enum { SEGMENTS_A_CALL = 600, SCALED_TURNS = 16 }; /* turns for the magnitudes, as in run/resolve.py */
+enum { SEGMENTS_A_CALL = 600, SCALED_TURNS = 16 }; /* turns for the magnitudes, as in request/resolve.py */
 
 /* Numbers that segments may take while they are sought, 4 GiB; and how many one takes, in lists that grow twofold. */
 static const double MOST_NUMBERS = 536870912.0, SEGMENT_NUMBERS = 6.0;

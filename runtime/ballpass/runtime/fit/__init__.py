@@ -1,0 +1,1 @@
+"""Unknowns from measured signals."""

@@ -1,0 +1,1 @@
+"""Strength, life and wear of bearings over a run or a duty cycle."""

@@ -1,0 +1,252 @@
+"""The report on strength and life of a scene's bearings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from ballpass.runtime.life.records import BearingStrength, DutyLife, StateStrength
+from ballpass.runtime.ratings.elements import RATED
+from ballpass.runtime.ratings.life import MILLION
+from ballpass.runtime.ratings.wear import COEFFICIENTS
+from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.report.report import Report, ReportTable, Words
+from ballpass.runtime.report.reported import Reported
+
+_Parts = list[Words | ReportTable]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeReport(Reported):
+    """Strength and life of all bearings of a scene; see `ballpass.runtime.Model.life`.
+
+    Attributes
+    ----------
+    scene, title : of the model
+    states : of the duty cycle, one for a scene without
+    duty : life of each bearing over the cycle; empty for a scene without
+
+    Examples
+    --------
+    >>> report = model.life(cycles=4, transient=2)
+    >>> [f"{bearing.life / 1e6:.0f} million turns" for bearing in report.bearings]
+    ['225 million turns']
+    """
+
+    scene: str
+    title: str
+    states: tuple[StateStrength, ...]
+    duty: tuple[DutyLife, ...]
+
+    @property
+    def bearings(self) -> tuple[BearingStrength, ...]:
+        """The bearings in the first state."""
+        return self.states[0].bearings
+
+    @property
+    def unsettled(self) -> tuple[str, ...]:
+        """Sentences about lives that more turns would change."""
+        return tuple(
+            f"{f'State {state.name}: ' if state.name else ''}{_turns_words(state)} "
+            "Take more: --cycles; of a load or speed over time those of a whole cycle of work."
+            for state in self.states
+            if not state.settled
+        )
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Limits of these numbers that bearings are beyond, sentences."""
+        return tuple(
+            f"{' '.join(filter(None, ('Bearing', bearing.name, state.name and f'in state {state.name}')))}: {words}"
+            for state in self.states
+            for bearing in state.bearings
+            for words in bearing.beyond
+        )
+
+    @property
+    def has_lives(self) -> bool:
+        """Whether the rings turn against each other, in any state."""
+        return any(bearing.life is not None for state in self.states for bearing in state.bearings)
+
+    def _report(self) -> Report:
+        facts = asdict(self)
+        for state, plain in zip(self.states, facts["states"], strict=True):
+            for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
+                entry["hours"] = None if bearing.life is None else bearing.hours(bearing.life)
+        facts["wear_coefficients"] = list(COEFFICIENTS)
+        records = [
+            {
+                "state": state.name,
+                "bearing": bearing.name,
+                "life": math.nan if bearing.life is None else bearing.life,
+                "hours": math.nan if bearing.life is None else bearing.hours(bearing.life),
+                "peak_force": bearing.peak_force,
+                "static_safety": bearing.static_safety,
+                "peak_pressure": max(bearing.inner.peak_pressure, bearing.outer.peak_pressure),
+            }
+            for state in self.states
+            for bearing in state.bearings
+        ]
+        swinging = [bearing.why_no_life for state in self.states for bearing in state.bearings if bearing.why_no_life]
+        return Report(
+            title=f"{self.title}: strength and life of its bearings",
+            parts=[*(part for state in self.states for part in _state_parts(state))]
+            + [part for life in self.duty for part in _duty_parts(life)]
+            + self._meanings(),
+            facts=facts,
+            records=records,
+            index=("state", "bearing"),
+            warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
+        )
+
+    def _meanings(self) -> _Parts:
+        """What the lives are."""
+        if not self.has_lives:
+            return []
+        lives = "  Lives: what 90 % of such bearings reach. basic: from P alone (ISO 281); reference: from the load of "
+        lives += "every ball or roller at every place of both raceways (ISO 16281)"
+        if any(bearing.factor is not None for state in self.states for bearing in state.bearings):
+            lives += "; modified: with a factor a_ISO for oil film (viscosity ratio κ) and dirt (contamination e_C)"
+        return [f"{lives}."]
+
+    def __repr__(self) -> str:
+        parts = []
+        for found in self.duty or self.bearings:
+            name = f"{found.name}: " if found.name else ""
+            if found.why_no_life:
+                parts.append(f"{name}no life")
+            elif isinstance(found, DutyLife):
+                parts.append(f"{name}{found.hours:.4g} h")
+            else:
+                parts.append(f"{name}{_million(found.life)}, s_0 {found.static_safety:.3g}")
+        return f"LifeReport({self.scene}: {'; '.join(parts)})"
+
+
+def _turns_words(state: StateStrength) -> str:
+    run = "The run" if state.turns is None else f"{state.turns:.4g} steady turns"
+    if state.settled:
+        return f"{run}, settled: the second half moved lives and peaks by at most {rounded(100.0 * state.change, 2)} %."
+    return f"{run}, not settled: the second half moved a life or a peak by {rounded(100.0 * state.change, 2)} %."
+
+
+def _state_parts(state: StateStrength) -> _Parts:
+    parts: _Parts = []
+    if state.name:
+        parts += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
+    if not state.bearings:
+        return [*parts, "  nothing turns: no damage"]
+    parts.append(f"  {_turns_words(state)}")
+    parts.append("")  # behind a table there is one
+    for bearing in state.bearings:
+        parts += _bearing_parts(bearing)
+    what = "Wear and P" if any(bearing.life is not None for bearing in state.bearings) else "Wear"
+    return [*parts, f"  {what}: means of {state.samples} samples; angles from each ring's x axis."]
+
+
+def _bearing_parts(bearing: BearingStrength) -> _Parts:
+    rings, element = (bearing.inner, bearing.outer), RATED[bearing.element]
+    at = f"{bearing.peak_time:.5g} s"
+    if bearing.peak_angle is not None:
+        at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
+    rows: list[tuple[str, ...]] = [
+        ("peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
+        (element.contact_words, *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
+    ]
+    if not bearing.why_no_life:
+        rows += [
+            (f"equivalent {element.noun} load", *(_force(ring.equivalent_load) for ring in rings)),
+            ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
+            ("share of the damage", *(f"{100.0 * sum(ring.damage):.0f} %" for ring in rings)),
+        ]
+    if any(ring.wear[1] > 0.0 for ring in rings):  # a straight roller does not slip
+        rows += [
+            ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
+            ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
+            ("deepest wear, angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
+            (
+                f"deepest wear, distance from the {element.middle}",
+                *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings),
+            ),
+        ]
+    parts: _Parts = [
+        f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
+        f"  {_verdict(bearing)}",
+        f"  load ratings: dynamic C_r {_force(bearing.dynamic_rating)} "
+        f"({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
+        f"static C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
+        f"fatigue limit C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
+        f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
+        ReportTable(
+            heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring"), wrapped=("",)
+        ),
+    ]
+    if bearing.tilt is not None:
+        parts.append(f"  {bearing.tilt.words}")
+    if bearing.why_no_life:
+        parts.append(f"  No rating life. {bearing.why_no_life}")
+        return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
+    lives = {
+        f"basic L_10, equivalent load P {_force(bearing.equivalent_load)}": bearing.basic_life,
+        "reference L_10r": bearing.life,
+    }
+    if bearing.factor is not None:
+        film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
+        words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, {film}"
+        lives[words] = bearing.modified_life
+    known = {name: life for name, life in lives.items() if life is not None}
+    return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]
+
+
+def _verdict(bearing: BearingStrength) -> str:
+    """What the numbers mean."""
+    held = "bears its highest load" if bearing.static_safety >= 1.0 else "brinells at its highest load"
+    verdict = f"It {held}: static safety s_0 {bearing.static_safety:.3g}."
+    shortest = bearing.life if bearing.modified_life is None else bearing.modified_life
+    if shortest is None:
+        return verdict
+    hours = bearing.hours(shortest)
+    spent = f"{hours:.0f} h or longer" if hours < MILLION else "more than a million hours"
+    return f"{verdict} 90 % of such bearings run {'without limit' if math.isinf(shortest) else spent}."
+
+
+def _duty_parts(life: DutyLife) -> _Parts:
+    head = f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"
+    if life.hours is None or life.turns is None:
+        return ["", head, f"  No rating life. {life.why_no_life}"]
+    lives = {"reference L_10r": (life.turns, life.hours)}
+    if life.modified_hours is not None and life.modified_turns is not None:
+        lives["modified L_nmr"] = life.modified_turns, life.modified_hours
+    shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
+    return ["", head, _lives(lives), f"  Damage: {shares}."]
+
+
+def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
+    """Lives in turns and hours."""
+    heads = ("life", "million turns", "hours")
+    rows = [(name, *_life(*life)) for name, life in lives.items()]
+    return ReportTable(heads=heads, rows=rows, right=heads[1:], wrapped=heads[:1])
+
+
+def _life(turns: float, spent: float) -> tuple[str, str]:
+    if math.isinf(turns):
+        return "unlimited", "unlimited"
+    return rounded(turns / MILLION), f"{spent:.0f}" if 1e4 <= spent < MILLION else rounded(spent)
+
+
+def _million(turns: float | None) -> str:
+    return "" if turns is None else f"{rounded(turns / MILLION)} million turns"
+
+
+def _force(value: float | None) -> str:
+    assert value is not None
+    return f"{value:.0f} N" if value < 9999.5 else f"{value / 1e3:.4g} kN"
+
+
+def _source(bearing: BearingStrength, rating: str, otherwise: str) -> str:
+    return "given" if rating in bearing.given else otherwise
+
+
+def _wear(rate: float) -> str:
+    """Depth a second as depth an hour."""
+    return f"{rounded(1e6 * 3600.0 * rate, 2)} µm/h"

@@ -1,0 +1,1 @@
+"""Kinds of motion: periodic states and their branches, stroboscopic readings, exponents."""

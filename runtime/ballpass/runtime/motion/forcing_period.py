@@ -1,0 +1,285 @@
+"""After which time the equations of a model are the same again, found from what turns in them.
+
+In: a model, its numbers, states of a motion.  Out: a `ForcingPeriod`.
+
+Each phase that the equations depend on turns at its own rate.  Balls are alike, so that a cage need turn by whole ball
+pitches only: a ball then stands where another stood.  Whether that holds, for one ball may differ from the others, is
+seen from the accelerations at one state, now and a period later.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.manifest import InputInfo, Manifest, TurningInfo
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.solution.simulate import simulate
+from ballpass.runtime.solution.solution import Solution
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import STEP, TURN, Turning
+
+#: Two rates are commensurable where a fraction with at most this denominator meets their ratio so closely [1].
+LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
+
+#: Accelerations at one state a period apart, relative to the largest, that are the same [1].
+SAME = 1e-6
+
+#: Where in a range a period is compared beside its ends: the golden section, at which no ratio of speeds is one of
+#: small numbers because it is so at both ends [1].
+WITHIN_RANGE = 0.5 * (3.0 - math.sqrt(5.0))
+
+#: Moments of a motion at which the equations are compared.
+MOMENTS = 40
+
+#: Change of a phase that shows whether the equations depend on it [rad].
+NUDGE = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForcingPeriod:
+    """A period of the equations.
+
+    Attributes
+    ----------
+    turning : what fixes the period
+    count : turns of it in a period; a fraction where balls take each other's places
+    words : what happens in a period
+    difference : of the accelerations at one state a period apart, relative to the largest [1]
+    """
+
+    turning: TurningInfo
+    count: Fraction | float
+    words: str
+    difference: float
+
+    def time(self, values: Mapping[str, float]) -> float:
+        """The period for these numbers of the model [s]."""
+        return float(self.count) * TURN / abs(_rate(self.turning, values))
+
+    def slope(self, values: Mapping[str, float], moved: Mapping[str, float]) -> float:
+        """Derivative of the period along a direction of the numbers [s/unit]."""
+        rate = Turning.of(self.turning, timeline.along(values, moved)).rate[-1]
+        return float(-self.time(values) * np.imag(rate) / STEP / np.real(rate))
+
+
+def _rate(info: TurningInfo, values: Mapping[str, float]) -> float:
+    """Rate of a turning behind its last row [rad/s]."""
+    return float(Turning.of(info, values).rate[-1])
+
+
+def refuse_free_driver(manifest: Manifest, question: str) -> None:
+    """Refuse a scene where the driver's motion or a cage's lag is a state: no period."""
+    if timeline.is_free(manifest):
+        raise RequestError(
+            f"{question}: a torque drives in this scene, and the driver's motion is a state. Allowed: a driver or "
+            "shaft whose speed is given."
+        )
+    if any(coordinate.kind == "lag" for coordinate in manifest.coordinates):
+        raise RequestError(
+            f"{question}: the slip of a cage changes over time in this scene, and its lag is a state that no turn "
+            "brings back. Allowed: a constant slip."
+        )
+
+
+def sampled_turns(model: LoadedModel, parameters: Mapping[str, float], turns: float = 1.0) -> Solution:
+    """A run from the scene's start over so many turns that are alike, or a second where nothing turns, sampled at
+    `MOMENTS` of them."""
+    numbers = model.numbers(parameters)
+    turn, begin = timeline.period(model.manifest, numbers.values), timeline.alike_from(model.manifest, numbers.values)
+    end = begin + (turns * turn if math.isfinite(turn) else 1.0)
+    times = np.linspace(begin, end, MOMENTS)
+    return simulate(model, numbers, Request(duration=end, times=times, outputs=[], transient_cycles=0.0))
+
+
+def forcing_period(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, turns: float | None
+) -> ForcingPeriod:
+    """Find the shortest period of the equations, or check the one that is asked for.
+
+    Parameters
+    ----------
+    times, states : moments of a motion, at which the equations are compared, shapes (moments,), (moments, states) [s]
+    turns : the period that is asked for, of driver or shaft; None: find it
+
+    Raises
+    ------
+    RequestError
+        What turns has no common period, or nothing changes with time.
+    """
+    if turns is not None:
+        driver = timeline.driver_info(model.manifest)
+        if driver is None or _rate(driver, numbers.values) == 0.0:
+            raise RequestError("turns: nothing turns in this scene. Leave it away.")
+        asked = ForcingPeriod(turning=driver, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
+        return _checked(model, numbers, times, states, asked)
+    rates = _rates(model, numbers, times, states)
+    if not rates:
+        raise RequestError(
+            "steady: the equations do not change with time, so that they have no period. Look for a rest: "
+            "ballpass linearize."
+        )
+    (base, order), *others = rates.items()
+    speed = {info: abs(_rate(info, numbers.values)) for info in rates}
+    ratios = {info: float(speed[info] * n / (speed[base] * order)) for info, n in others}
+    near = {info: Fraction(ratio).limit_denominator(LARGEST_DENOMINATOR) for info, ratio in ratios.items()}
+    for info, ratio in ratios.items():
+        if abs(near[info] - ratio) > EXACT * ratio:
+            raise RequestError(_two_periods(base.rate, info.rate, float(ratio * order / rates[info])))
+    whole = math.lcm(*(one.denominator for one in near.values()))
+    # one ball that differs, or rings whose shapes turn with the balls, need more than a ball pitch
+    for several in range(1, int(max(rates.values())) + 1):
+        count = whole * several / order
+        words = "; ".join(
+            _turned(info, count * (near[info] * order / n if info in near else 1), n) for info, n in rates.items()
+        )
+        words = bearing_words(words, model.manifest.bearings)
+        found = _checked(
+            model, numbers, times, states, ForcingPeriod(turning=base, count=count, words=words, difference=0.0)
+        )
+        if found.difference <= SAME:
+            return found
+    raise RequestError(
+        f"steady: no period was found: after {float(count):g} turns of {base.rate} the accelerations at one state "
+        f"differ by {rounded(100.0 * found.difference, 2)} %. Give the period yourself: turns."
+    )
+
+
+def common_period(
+    model: LoadedModel,
+    parameters: Mapping[str, float],
+    over: ParameterRange,
+    sampled: Callable[[Mapping[str, float]], Solution],
+) -> ForcingPeriod:
+    """The shortest period of the equations that holds over a range of one parameter.
+
+    Parameters
+    ----------
+    parameters : overrides of others, SI
+    sampled : gives the motion with these overrides, as `sampled_turns`: at states of another one no ball may touch
+
+    Raises
+    ------
+    RequestError
+        As for `forcing_period` at both ends, or no period holds between them.
+    """
+    shares = (0.0, 1.0, WITHIN_RANGE)
+    given = [{**parameters, over.name: over.at(share)} for share in shares]
+    judged = [(model.numbers(one), run.t, run.x) for one in given for run in (sampled(one),)]
+    ends = [forcing_period(model, *one, None) for one in judged[:2]]
+    for found in ends:
+        if all(_checked(model, *one, found).difference <= SAME for one in judged):
+            return found
+    raise RequestError(
+        f"{over.name}: at its first end {ends[0].words}, at its second {ends[1].words}: no period holds between. "
+        "Allowed: parameters that leave the ratio of the speeds as it is."
+    )
+
+
+def phase_drifts(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float
+) -> dict[str, float]:
+    """What stands elsewhere after each time `every` [s], by its rate: the part of a turn, of a cage the part of a ball
+    pitch, beyond whole ones.
+
+    Parameters
+    ----------
+    times, states : as for `forcing_period`
+    """
+    found: dict[str, float] = {}
+    for info, alike in _rates(model, numbers, times, states).items():
+        rounds = abs(_rate(info, numbers.values)) * float(alike) * every / TURN
+        if abs(rounds - round(rounds)) > EXACT * rounds:
+            found[info.rate] = rounds % 1.0
+    return found
+
+
+def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
+    """What else turns than a bearing's cage and stands elsewhere after each time, as for `phase_drifts`."""
+    alike = {info.rate for info in model.manifest.turnings if info.parts > 1}
+    return [rate for rate in phase_drifts(model, numbers, times, states, every) if rate not in alike]
+
+
+def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[TurningInfo, Fraction]:
+    """What turns that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls:
+    a part of one where loads repeat after several."""
+    found: dict[TurningInfo, Fraction] = {}
+    for k, item in enumerate(model.manifest.inputs):
+        if not item.turning or item.kind in ("angle", "rate", "slope"):
+            continue
+        info = timeline.info_of(model.manifest, item)
+        if _rate(info, numbers.values) != 0.0 and _matters(model, numbers, times, states, k, item):
+            turns = timeline.repeats_after(item, numbers.values) if item.turns > 1 else 1
+            parts = Fraction(1, turns) if turns > 1 else Fraction(info.parts)
+            known = found.get(info, parts)
+            found[info] = Fraction(1, math.lcm(known.denominator, turns)) if known.denominator * turns > 1 else known
+    return dict(sorted(found.items(), key=lambda one: one[0].kind != "driver"))
+
+
+def _matters(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, row: int, item: InputInfo
+) -> bool:
+    """Whether the equations depend on an input at any of the moments."""
+    if item.kind != "phase":
+        return True
+    rhs = model.kernel("rhs")
+    for t, x in zip(times.tolist(), states, strict=True):
+        there = point(model, numbers, t, x)
+        before = np.array(rhs(there))
+        moved = np.array(there["u"])
+        moved[row] += NUDGE
+        if not np.array_equal(before, np.array(rhs({**there, "u": moved}))):
+            return True
+    return False
+
+
+def _checked(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, period: ForcingPeriod
+) -> ForcingPeriod:
+    """The period with the difference that it leaves between accelerations at one state."""
+    rhs, length = model.kernel("rhs"), period.time(numbers.values)
+    first, later = (
+        np.array(
+            [np.array(rhs(point(model, numbers, t + after, x))) for t, x in zip(times.tolist(), states, strict=True)]
+        )
+        for after in (0.0, length)
+    )
+    largest = max(float(np.max(np.abs(first))), 1e-300)
+    difference = float(np.max(np.abs(later - first))) / largest
+    return ForcingPeriod(turning=period.turning, count=period.count, words=period.words, difference=difference)
+
+
+def _turned(info: TurningInfo, turns: Fraction, alike: Fraction) -> str:
+    name = info.rate if info.kind in ("pass", "spin", "load") else info.words
+    if alike > 1 and turns.denominator > 1:
+        pitches = turns * alike
+        return f"{name} turns by {_count(pitches, 'ball pitch', 'ball pitches')}, balls renumbered by {pitches % alike}"
+    return f"{name} makes {_count(turns, 'turn', 'turns')}"
+
+
+def _count(number: Fraction, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _two_periods(base: str, name: str, ratio: float) -> str:
+    near = ", ".join(
+        f"{one} (off by {abs(float(one) - ratio):.1e})"
+        for one in dict.fromkeys(Fraction(ratio).limit_denominator(most) for most in (20, 200, 2000))
+    )
+    return (
+        f"steady: {name} turns {ratio:.12g} times as fast as {base}, which is no fraction with a denominator up to "
+        f"{LARGEST_DENOMINATOR}: the motion has two periods, and no state repeats. Near: {near}. Change a diameter so "
+        "that it is one, or give the period that is near enough: turns. The closed curve on which the states lie: "
+        "ballpass section; statistics: ballpass run --turns settle; stroboscopic values: ballpass bifurcation."
+    )

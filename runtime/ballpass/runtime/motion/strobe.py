@@ -1,0 +1,161 @@
+"""When states are read stroboscopically, and the periodic state to which readings come.
+
+In: a model, a range of a parameter or none.  Out: `Strobe`.
+
+Readings are a period of the equations apart, or a turn where that is long or there is none: balls or loads are then
+elsewhere each time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ballpass.runtime.ask.kept_parts import KeptParts
+from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.motion.forcing_period import (
+    ForcingPeriod,
+    common_period,
+    forcing_period,
+    phase_drifts,
+    sampled_turns,
+)
+from ballpass.runtime.motion.lyapunov import REPEATED, changes_after, common_round, period_of
+from ballpass.runtime.motion.shooting import Shooting
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.solution.solution import Solution
+from ballpass.runtime.time import timeline
+
+#: Longest period of the equations that is taken between readings, in turns; else it is one turn.
+LONGEST_STROBE = 8.0
+
+#: Readings come to a state where changes fall to this share from their first third to their last; longest period of a
+#: state that is sought so, in readings.
+FALLS, LONGEST_SOUGHT = 0.95, 4
+
+#: Readings by which a motion is named whose points are others.
+READ = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strobe:
+    """When states are read.
+
+    Attributes
+    ----------
+    period : of the equations; None where readings are a turn apart, after which they are others
+    every : time between readings, in words
+    """
+
+    period: ForcingPeriod | None
+    every: str
+
+    def time(self, model: LoadedModel, parameters: Mapping[str, float]) -> float:
+        """Time between readings with these overrides [s]."""
+        values = model.numbers(parameters).values
+        return timeline.period(model.manifest, values) if self.period is None else self.period.time(values)
+
+    def drifts(self, model: LoadedModel, parameters: Mapping[str, float]) -> Collection[float]:
+        """Parts of a round by which phases of the equations move from reading to reading."""
+        if self.period is not None:
+            return ()
+        run, every = sampled_turns(model, parameters), self.time(model, parameters)
+        return phase_drifts(model, model.numbers(parameters), run.t, run.x, every).values()
+
+    def settled(
+        self,
+        model: LoadedModel,
+        parameters: Mapping[str, float],
+        states: np.ndarray,
+        magnitude: np.ndarray,
+        parts: KeptParts,
+    ) -> tuple[int, np.ndarray] | None:
+        """The stable state to which readings come that do not repeat after one, and after how many it repeats.
+
+        None where none is seen.
+
+        A motion that contracts and turns looks like a cycle of many readings as it comes back near to earlier ones.
+        Newton's iteration from the last reading finds where it goes, and its multipliers say how fast.
+        """
+        repeats = period_of(states, magnitude)
+        if self.period is None or repeats == 1:
+            return None
+        begun = Shooting(model=model, parameters=parameters, period=self.period, magnitude=magnitude, parts=parts)
+        for period in range(1, repeats or min(LONGEST_SOUGHT, len(states) // 4) + 1):
+            changes = changes_after(states, magnitude, period)
+            third = max(len(changes) // 3, 1)
+            if repeats % period or (not repeats and not np.max(changes[-third:]) < FALLS * np.max(changes[:third])):
+                continue
+            try:
+                found = replace(begun, repeats=period).solve(states[-1:])
+            except SimulationError:
+                continue
+            away = np.max(np.abs((states[::-period] - found.nodes[0]) / magnitude), axis=1)[::-1]
+            third = max(len(away) // 3, 1)
+            size = abs(found.multipliers[0])
+            # between the middles of these thirds a disturbance falls by its power of two thirds of the readings
+            falls = max(REPEATED, size ** (len(away) / 3.0) * np.max(away[:third]))
+            if size < 1.0 and np.max(away[-third:]) <= falls:
+                return period, found.nodes[0]
+        return None
+
+    def name_of(
+        self, model: LoadedModel, parameters: Mapping[str, float], run: Solution, begin: float, *, follows: bool
+    ) -> str:
+        """Name of the motion of a run that `sample_times` are among the times of, as `kind_of_motion` gives it.
+
+        Parameters
+        ----------
+        begin : from which time on readings count [s]
+        follows : whether the state at an angle is a function of where the balls stand
+        """
+        if self.period is None:
+            rounds = common_round(self.drifts(model, parameters))
+            return "undecided" if not follows else f"periodic {rounds}" if rounds else "quasi-periodic"
+        times = self.sample_times(model, parameters, begin, float(run.t[-1]))
+        states, magnitude = run.x[np.searchsorted(run.t, times)], np.array(run.statistics.magnitudes)
+        found = self.settled(model, parameters, states, magnitude, KeptParts(None, ())) if model.has_stepper else None
+        repeats = found[0] if found is not None else period_of(states, magnitude)
+        return f"periodic {repeats}" if repeats else "undecided"
+
+    def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
+        """Times between two others at which states are read, the last `READ` of them [s]."""
+        step = self.time(model, parameters)
+        alike = timeline.alike_from(model.manifest, model.numbers(parameters).values)
+        first, last = math.ceil((begin - alike) / step), math.floor((end - alike) / step)
+        return alike + step * np.arange(first, last + 1)[-READ:]
+
+
+def strobe_of(
+    model: LoadedModel, parameters: Mapping[str, float], over: ParameterRange | None, question: str
+) -> Strobe:
+    """When states are read, over a range of a parameter or for these numbers alone.
+
+    Raises
+    ------
+    RequestError
+        Nothing turns.
+    """
+    first = parameters if over is None else {**parameters, over.name: over.low}
+    values = model.numbers(first).values
+    turn = timeline.period(model.manifest, values)
+    if not math.isfinite(turn):
+        raise RequestError(f"{question}: nothing turns in this scene. Allowed: a driver or shaft that turns.")
+    try:
+        if over is None:
+            run = sampled_turns(model, first)
+            period = forcing_period(model, model.numbers(first), run.t, run.x, None)
+        else:
+            period = common_period(model, parameters, over, partial(sampled_turns, model))
+    except RequestError:  # no common period: readings are taken each turn, and the report says so
+        period = None
+    if period is not None and period.time(values) <= LONGEST_STROBE * turn:
+        return Strobe(period=period, every=f"each time {period.words}")
+    words = bearing_words("once a turn, after which balls or loads are elsewhere", model.manifest.bearings)
+    return Strobe(period=None, every=words)

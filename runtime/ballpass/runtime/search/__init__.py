@@ -1,0 +1,1 @@
+"""Minima under bounds and constraints, of smooth and of kinked functions."""

@@ -1,0 +1,1 @@
+"""Inputs that are drawn: whose scatter a result owes how much."""

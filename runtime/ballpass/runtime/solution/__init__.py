@@ -1,0 +1,1 @@
+"""What a run returns: samples, statistics, sensitivities, settled values, and their files."""

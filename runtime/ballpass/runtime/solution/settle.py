@@ -1,0 +1,269 @@
+"""Find the number of turns for a peak: a run continues until its extremes and means settle.
+
+In: a model, numbers, a request.  Out: `Settled`.  The balls meet the load's peak in other places each turn, so the peak
+of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel by
+more than `PEAKS` of its range, and no rms by more than `MEANS`.  Fewer than `LEAST` turns are not trusted: two and four
+of them may share a peak by luck.
+
+What later turns do not come near is of the start, as the impact of a ring that falls through its clearance: where the
+second half of the turns misses an extreme of the first by more than `START` of the range, the first half is transient.
+
+`look_beyond` shows what more turns change in any run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, real
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.request.beats import slowest_beat
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import Run, asked_span, resolve
+from ballpass.runtime.request.start import state_at
+from ballpass.runtime.run.reduced_run import start_reducing
+from ballpass.runtime.run.reductions import Reductions, channel_names, joined
+from ballpass.runtime.show import html
+from ballpass.runtime.show.short import ShortRepr
+from ballpass.runtime.solution.solution import Solution
+from ballpass.runtime.time import timeline
+
+#: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
+PEAKS, MEANS = 5e-3, 1e-2
+
+#: Part of its range by which an extreme of a channel is above all of later turns where it is one of the start [1].
+START = 5e-2
+
+#: Steady turns that are compared with twice as many at first, and the most that are run.
+LEAST, MOST = 64, 4096
+
+#: Steps that `look_further` may take beside a run: some tenth of a second.
+STEPS = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Settled(ShortRepr):
+    """A run whose extremes and means more turns do not change.
+
+    Attributes
+    ----------
+    reductions : over all steady turns
+    turns : how many they are
+    dropped : turns before them that were transient as well
+    first : of each channel whose extreme is one of the start: "max" or "min", its time [s], it, and that of later turns
+    settled : whether half of them gave the same; False where the most turns were not enough
+    changes : of each channel by the second half of the turns: of the extremes, over the range, and of the rms [1]
+    """
+
+    reductions: Reductions
+    turns: int
+    settled: bool
+    changes: Mapping[str, tuple[float, float]]
+    dropped: int = 0
+    first: Mapping[str, tuple[str, float, float, float]] = field(default_factory=dict)
+
+    def _repr_html_(self) -> str:
+        state = "Settled" if self.settled else "Not settled"
+        return html.block(html.title(f"{state}: {self.turns} turns", self.words), self.reductions.table_html())
+
+    @property
+    def words(self) -> str:
+        """The result as a sentence."""
+        return self.words_of(str)
+
+    def words_of(self, called: Callable[[str], str]) -> str:
+        """The result as a sentence, with words for the name of a channel."""
+        name = max(self.changes, key=lambda channel: max(self.changes[channel]))
+        peak, mean = self.changes[name]
+        state = "settled" if self.settled else "not settled"
+        behind = f" behind {self.dropped} of transient" if self.dropped else ""
+        return (
+            f"peaks and rms {state} over {self.turns} steady turns{behind}: the second half changed extremes and rms "
+            f"most in {called(name)}, by {rounded(100.0 * peak, 2)} % of its range and {rounded(100.0 * mean, 2)} %"
+        )
+
+
+def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = MOST) -> Settled:
+    """Continue a run until twice the turns change nothing.
+
+    Parameters
+    ----------
+    request : its length is left out
+    most : steady turns
+
+    Raises
+    ------
+    RequestError
+        A wrong request, nothing turns, or something follows a table over time.
+    SimulationError
+        The computation failed.
+    """
+    if request.cycles is not None or request.duration is not None:
+        raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
+    turn = timeline.period(model.manifest, numbers.values)
+    slowest = timeline.longest_harmonic(model.manifest, numbers.values)
+    slowest = math.ceil(max(slowest, slowest_beat(model.manifest, numbers.values, MOST // 2 * turn)) / turn)
+    turns = timeline.whole_cycles(model.manifest, numbers.values, max(LEAST, slowest))
+    if not (real(most) >= 2 * turns and float(most).is_integer()):
+        why = f" The slowest harmonic load, or beat, takes {slowest} turns for a period." if slowest > LEAST else ""
+        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
+    span = asked_span(model, numbers, replace(request, cycles=1.0))
+    if not repeats(model, numbers.values, span.start):
+        raise RequestError(
+            "settle: load, speed or slip of this scene follow a table or a window over time, so that its turns are "
+            "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
+            "are meant, without settle."
+        )
+    run = resolve(model, numbers, request, span=span.counting(turns))
+    going, counter, noise = start_reducing(run, channel_names(model.manifest)), _counter(model), tolerated(run)
+    going.go_on()
+    before, lost = going.take(), 0
+    while True:
+        turns *= 2
+        going.go_on(run.start + turns * turn)
+        later = going.take()
+        found = joined(before, later)
+        assert found is not None
+        changes = changed(before, found, noise, counter)
+        of_start = bool(extremes_of_start(before, later, noise, counter))
+        settled = _settled(changes) and not of_start
+        if settled or 2 * turns > most:
+            return Settled(reductions=found, turns=turns - lost, settled=settled, changes=changes, dropped=lost)
+        if of_start:
+            before, lost = later, turns // 2
+        else:
+            before = found
+
+
+def look_further(model: LoadedModel, numbers: Numbers, solution: Solution, turns: int | None = None) -> Settled | None:
+    """`look_beyond` of a run that is done; None where another method than the project's own stepper ran.
+
+    Parameters
+    ----------
+    turns : in place of those that `STEPS` steps reach
+
+    Raises
+    ------
+    SimulationError
+        The longer run failed.
+    """
+    few, statistics = solution.steady_reductions, solution.statistics
+    if few is None or solution.cycle_length is None or not statistics.steps:
+        return None
+    request = Request(
+        duration=statistics.duration,
+        transient_cycles=solution.transient_cycles,
+        method=statistics.method,
+        rtol=statistics.rtol,
+        kinks=statistics.kinks,
+        initial=state_at(model, numbers, statistics.begin, np.array(statistics.initial)),
+    )
+    return look_beyond(resolve(model, numbers, request), few, turns)
+
+
+def reduced(run: Run) -> Reductions:
+    """Reductions of the steady turns of a run."""
+    going = start_reducing(run, channel_names(run.model.manifest))
+    going.go_on()
+    return going.take()
+
+
+def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = None) -> Settled | None:
+    """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
+
+    None where the run is about as long, nothing turns, or something follows a table over time.
+
+    Parameters
+    ----------
+    few : reductions of the run, where they are known
+    turns : in place of those that `STEPS` steps reach
+
+    Raises
+    ------
+    SimulationError
+        The longer run failed.
+    """
+    model, turn = run.model, run.span.turning.turn
+    if not repeats(model, run.numbers.values, run.start):
+        return None
+    if few is None:
+        few = reduced(run)
+    whole = (few.start + few.duration - run.begin) / turn
+    cycle = timeline.cycle_turns(model.manifest, run.numbers.values)
+    if turns is None:
+        least = timeline.whole_cycles(model.manifest, run.numbers.values, LEAST)
+        turns = min(least, int(STEPS * whole / max(few.steps, 1)))
+        turns -= turns % cycle
+    if turns < 2.0 * few.duration / turn:
+        return None
+    longer, counter = replace(run, span=run.span.counting(turns), progress=None), _counter(model)
+    going = start_reducing(longer, channel_names(model.manifest))
+    going.go_on((longer.start + longer.end) / 2.0)
+    early = going.take()
+    going.go_on()
+    later = going.take()
+    found = joined(early, later)
+    assert found is not None
+    noise = tolerated(longer)
+    changes = changed(few, found, noise, counter)
+    first = extremes_of_start(few, later, noise, counter)
+    return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
+
+
+def repeats(model: LoadedModel, values: Mapping[str, float], begin: float) -> bool:
+    """Whether turns from a time on [s] are alike: something turns, and no table over time changes a value then."""
+    turn = timeline.period(model.manifest, values)
+    if not math.isfinite(turn) or not math.isfinite(begin):
+        return False
+    return not timeline.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
+
+
+def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:
+    return all(peak <= PEAKS and mean <= MEANS for peak, mean in changes.values())
+
+
+def _counter(model: LoadedModel) -> str:
+    """The channel that counts turns: the driver's angle where it is a state; empty without."""
+    mechanism = model.manifest.mechanism
+    return "" if mechanism is None else mechanism.angle
+
+
+def tolerated(run: Run) -> dict[str, float]:
+    """What steps may be off by in each state: of a ring that has come to rest no digit is left."""
+    return dict(zip(run.model.states, (run.rtol * run.magnitude).tolist(), strict=True))
+
+
+def changed(
+    few: Reductions, many: Reductions, noise: Mapping[str, float], counter: str = ""
+) -> dict[str, tuple[float, float]]:
+    """Change of extremes over the range of each channel but the `counter`, and of its rms [1]; none within `noise`."""
+    found = {}
+    for name, less in few.items():
+        if name == counter:
+            continue
+        more, span, least = many[name], many[name].range, noise.get(name, 0.0)
+        peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
+        mean = abs(less.rms / more.rms - 1.0) if abs(less.rms - more.rms) > least and more.rms > 0.0 else 0.0
+        found[name] = (peak / span if peak > least and span > 0.0 else 0.0, mean)
+    return found
+
+
+def extremes_of_start(
+    few: Reductions, later: Reductions, noise: Mapping[str, float], counter: str = ""
+) -> dict[str, tuple[str, float, float, float]]:
+    """Extremes that later turns do not come near, as `Settled.first`; not of the `counter`, and none within `noise`."""
+    found = {}
+    for name, first in few.items():
+        behind = later[name]
+        up, down = first.maximum - behind.maximum, behind.minimum - first.minimum
+        missed = max(up, down)
+        if name != counter and missed > max(START * behind.range, noise.get(name, 0.0)):
+            most = ("max", first.maximum_time, first.maximum, behind.maximum)
+            found[name] = most if up >= down else ("min", first.minimum_time, first.minimum, behind.minimum)
+    return found
