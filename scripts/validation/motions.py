@@ -1,11 +1,14 @@
 """Motions against published ones: ``python -m scripts.validation.motions``.
 
-Varying compliance, Andrews' squeezing mechanism of the IVP test set, and SUNDIALS' slider-crank with sensitivities.
+Varying compliance, Andrews' squeezing mechanism of the IVP test set, SUNDIALS' slider-crank with sensitivities, and two
+mechanisms of the Modelica Standard Library.  ``--write`` writes their motions at a tolerance of 1e-12 as CSV instead.
 """
 
 from __future__ import annotations
 
+import csv
 import math
+import sys
 import tempfile
 from pathlib import Path
 
@@ -23,6 +26,11 @@ ACCELERATION = 14222.4439199541
 #: G, dG/dk, dG/dc: printed output of SUNDIALS' example idasSlCrank_FSA_dns, there to its tolerance; digits beyond from
 #: an independent program.
 CRANK = (3.3366068, 0.3334481, -0.3637540)
+#: Scene of this folder; angle of the crank from its start after 5 s [rad]: the library's file of reference results
+#: (modelica/MAP-LIB_ReferenceResults), an independent program: integral of energy, Lagrange's equations by hand.
+MODELICA = (("engine1a", 53.41520, 53.41651894255), ("planar_fourbar", -0.93978, -0.93436106))
+#: Folder of the motions as CSV, and how many times each has behind its start.
+MOTIONS, TIMES = HERE.parents[1] / "docs" / "validation" / "motions", 100
 
 
 def made(path: Path, folder: str) -> Model:
@@ -55,6 +63,33 @@ def slider_crank(folder: Path) -> tuple[float, float, float]:
     return 10.0 * stiffness.value, 10.0 * stiffness.derivative, 10.0 * damping.derivative
 
 
+def motion(model: Model, rtol: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time [s], angle [rad] and speed [rad/s] of the driver at equal times of the scene's run."""
+    run = model.simulate(rtol=rtol, times=np.linspace(0.0, float(model.manifest.run.duration or 0.0), TIMES + 1))
+    return run.t, run["driver.angle"], run["driver.speed"]
+
+
+def write() -> list[str]:
+    """Write the motions at a tolerance of 1e-12; the files."""
+    scenes = {
+        "andrews": shipped_scenes()["andrews"],
+        "slider_crank": HERE.parents[1] / "tests/physics/slider_crank.toml",
+    }
+    scenes |= {name: HERE / f"{name}.toml" for name, *_ in MODELICA}
+    for name, path in scenes.items():
+        with tempfile.TemporaryDirectory() as folder:
+            columns = motion(made(path, folder), 1e-12)
+        # ten digits of the largest: two methods agree in them
+        places = [9 - math.floor(math.log10(float(np.abs(column).max()))) for column in columns]
+        with (MOTIONS / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file, lineterminator="\n")
+            rows.writerow(["time [s]", "driver.angle [rad]", "driver.speed [rad/s]"])
+            rows.writerows(
+                [f"{x:.{n}f}" for x, n in zip(row, places, strict=True)] for row in zip(*columns, strict=True)
+            )
+    return [f"{name}.csv" for name in scenes]
+
+
 def printed() -> list[str]:
     """The tables as text."""
     scenes = shipped_scenes()
@@ -78,8 +113,14 @@ def printed() -> list[str]:
     out.append("")
     for name, theirs, value in zip(("G", "dG/dk", "dG/dc"), CRANK, slopes, strict=True):
         out.append(f"slider-crank, {name}: theirs {theirs:.6f}, own {value:.6f}")
+    out.append("")
+    for name, file, theirs in MODELICA:
+        with tempfile.TemporaryDirectory() as folder:
+            _, angle, _ = motion(made(HERE / f"{name}.toml", folder), 1e-12)
+        value = angle[-1] - angle[0]
+        out.append(f"{name}, angle after 5 s: file {file:.5f}, theirs {theirs:.8f}, own {value:.8f} rad")
     return out
 
 
 if __name__ == "__main__":
-    print("\n".join(printed()))
+    print("\n".join(write() if "--write" in sys.argv else printed()))

@@ -165,6 +165,7 @@ NAMED: dict[str, dict[str, str]] = {
         "between 200 and 300 N s/m": "the table",
     },
     "docs/validation/motions.md": {
+        "tolerance of 1e-12 and": "`write` of scripts/validation/motions.py; test_driven_crank.py",
         "20 kg, 196 N, no clearance": "the scene",
         "energy over 10 s": "the scene",
         "program at 1e-11": "its tolerance",

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.integrate import simpson
+from scipy.integrate import quad, simpson
 
 from ballpass.derive import derive, generate, read_scene
 from ballpass.derive.mechanism.sweep import Evaluator
@@ -297,3 +297,49 @@ def test_no_step_passes_over_a_narrow_window(press: Model) -> None:
     run = press.simulate(rtol=1e-3, cycles=3.0, parameters=narrow)
     assert run.statistics.located == 6
     assert run.statistics.steps < 60
+
+
+def test_engine1a_turns_as_its_energy_says(tmp_path: Path) -> None:
+    """`Engine1a` of the Modelica Standard Library: kinetic and potential energy of a coasting crank-slider are kept."""
+    model = load(generate(ROOT / "scripts/validation/engine1a.toml", tmp_path / "model"))
+    steel = 7700.0
+    web, shaft, pin = steel * 0.1 * 0.05 * 0.02, steel * np.pi * 0.025**2 * 0.1, steel * np.pi * 0.015**2 * 0.1
+    rod, piston = steel * 0.2 * 0.06 * 0.02, steel * np.pi * 0.05**2 * 0.1
+    about_axis = 1.0 + shaft * 0.025**2 / 2 + pin * (0.015**2 / 2 + 0.1**2)
+    about_axis += 2 * web * ((0.1**2 + 0.05**2) / 12 + 0.05**2)
+    about_middle = rod * (0.2**2 + 0.06**2) / 12
+
+    def inertia_and_height(turned: float) -> tuple[float, float]:
+        """Reduced inertia; potential energy over gravity.  The crank stands upright at the start."""
+        swing = np.arcsin(-0.5 * np.sin(turned))
+        rate = -0.5 * np.cos(turned) / np.cos(swing)
+        slide = -0.1 * np.sin(turned) - 0.2 * np.sin(swing) * rate
+        across = 0.1 * np.cos(turned) + 0.1 * np.cos(swing) * rate
+        along = -0.1 * np.sin(turned) - 0.1 * np.sin(swing) * rate
+        inertia = about_axis + about_middle * rate**2 + rod * (across**2 + along**2) + piston * slide**2
+        high = 0.1 * np.cos(turned)
+        pin_height = 2 * web * high / 2 + pin * high
+        return inertia, pin_height + rod * (high + 0.1 * np.cos(swing)) + piston * (high + 0.2 * np.cos(swing))
+
+    inertia, height = inertia_and_height(0.0)
+    energy = 0.5 * inertia * 10.0**2 + 9.81 * height
+
+    def slowness(turned: float) -> float:
+        inertia, height = inertia_and_height(turned)
+        return float(np.sqrt(inertia / (2.0 * (energy - 9.81 * height))))
+
+    turned = float(model.simulate(rtol=1e-12)["driver.angle"][-1]) - np.pi / 2
+    turns, rest = divmod(turned, 2.0 * np.pi)
+    time = turns * quad(slowness, 0.0, 2.0 * np.pi, epsabs=1e-13)[0] + quad(slowness, 0.0, rest, epsabs=1e-13)[0]
+    assert time == pytest.approx(5.0, abs=1e-10)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["andrews", "slider_crank", "engine1a", "planar_fourbar"])
+def test_published_motions_are_those_of_another_method(name: str, tmp_path: Path) -> None:
+    homes = {"andrews": ANDREWS, "slider_crank": ROOT / "tests/physics/slider_crank.toml"}
+    model = load(generate(homes.get(name, ROOT / f"scripts/validation/{name}.toml"), tmp_path / "model"))
+    time, *columns = np.loadtxt(ROOT / f"docs/validation/motions/{name}.csv", delimiter=",", skiprows=1).T
+    run = model.simulate(rtol=1e-12, times=time, method="stepper-rodas5p")
+    for column, channel in zip(columns, ("driver.angle", "driver.speed"), strict=True):
+        assert np.abs(run[channel] - column).max() <= 6e-10 * np.abs(column).max(), channel  # ten digits are written
