@@ -13,7 +13,7 @@ from ballpass.derive import SceneError, generate, read_scene
 from ballpass.derive.scene.bearing_records import EquivalentMass
 from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.runtime import Model, RequestError, load
-from ballpass.runtime.certify.simplification import measure_simplification, rows, to_plain
+from ballpass.runtime.certify.simplification import measure_simplification
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 TWO_WAY = SCENES / "punching_press_two_way.toml"
@@ -104,11 +104,12 @@ def test_changes_are_those_of_single_runs(make_model: Callable[..., Model], tmp_
         assert found.error[name] == pytest.approx(abs(found.change[name]), abs=1e-4)
     assert found.change[PEAK] < -0.1  # the paper's model is too low
     assert ("times as fast" in found.words) == (found.gain >= 1.0)  # which, depends on the machine's other work
-    assert np.shape(rows(found)[1]) == (2, 6)
-    speeds = next(row for row in rows(found)[1] if row[0] == "rms:inner.vy")
+    rows = found.report().parts[0].rows
+    assert np.shape(rows) == (2, 6)
+    speeds = next(row for row in rows if row[0] == "rms:inner.vy")
     assert (speeds[1], float(speeds[2])) == ("mm/s", pytest.approx(1e3 * found.values["rms:inner.vy"], rel=1e-3))
     assert found.meanings["rms:inner.vy"].startswith("Velocity of the centre of the inner ring along y")
-    assert to_plain(found)["simplification"]["units"] == {PEAK: "N", "rms:inner.vy": "m/s"}
+    assert found.to_json()["simplification"]["units"] == {PEAK: "N", "rms:inner.vy": "m/s"}
     # life is counted in turns, of a variant whose outputs do not name the ball force as well
     variant = load(generate(read_scene(SCENES / "punching_press.toml", coupling="two-way"), tmp_path / "variant"))
     assert "ball.force" not in variant.outputs

@@ -21,6 +21,7 @@ from ballpass.runtime.certify.certificate import UNCHECKED, Check, Verdict, comp
 from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour, point
 from ballpass.runtime.point.jacobian import (
@@ -34,6 +35,8 @@ from ballpass.runtime.point.jacobian import (
 )
 from ballpass.runtime.point.linearize import onset_notes
 from ballpass.runtime.point.slopes import slopes
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.time import timeline
 
 #: A factor of a unit such as "N*s/m^1.5": the mark before it, its name, its power.
@@ -55,7 +58,7 @@ STEP_FROM_ZERO = {"m": 1e-7, "m/s": 1e-4, "rad": 1e-3, "s": 1e-6, "N": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CheckedJacobian:
+class CheckedJacobian(Reported):
     """Derivatives and, for each, the result of a second route.
 
     Attributes
@@ -95,8 +98,8 @@ class CheckedJacobian:
                 return verdict
         return Verdict.VERIFIED
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and lists for JSON."""
+    def _entries(self) -> list[dict[str, Any]]:
+        """Plain data of each derivative, row by row."""
         entries = []
         for i, row in enumerate(self.rows):
             for j, column in enumerate(self.columns):
@@ -114,8 +117,39 @@ class CheckedJacobian:
                         "reason": check.reason,
                     }
                 )
-        found: dict[str, Any] = finite(
-            {
+        return entries
+
+    def _report(self) -> Report:
+        """Entries with their check, and the notes; entries that are structurally zero are left out and counted."""
+        entries = finite(self._entries())
+        shown = [
+            entry
+            for entry in entries
+            if entry["verdict"] == Verdict.DISAGREES.value
+            or entry["value"] != 0.0
+            or entry["sides"]
+            or len(self.rows) == 1
+        ]
+        agreed = all(entry["verdict"] == Verdict.VERIFIED.value for entry in shown)  # the title says so for all
+        rows = []
+        for entry in shown:
+            value, second = (None if entry[key] is None else f"{entry[key]:z.7g}" for key in ("value", "second"))
+            if entry["sides"]:
+                value = "{:z.7g} or {:z.7g}".format(*entry["sides"])
+            verdict = [] if agreed else [entry["verdict"]]
+            unit = printed_unit(entry["unit"])
+            rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", unit, *verdict))
+        table = ReportTable(
+            title=f"Derivatives at t = {self.time:.6g} s: {self.verdict.value}",
+            heads=("quantity", "parameter", "derivative", "by differences", "unit", *([] if agreed else ["verdict"])),
+            rows=rows,
+            right=("derivative", "by differences"),
+        )
+        still = len(entries) - len(shown)
+        disagrees = "the two routes disagree; both numbers are shown. " + " ".join(self.notes)
+        return Report(
+            parts=(table, *([f"{still} more {'is' if still == 1 else 'are'} zero."] if still else []), *self.notes),
+            facts={
                 "time": {"value": self.time, "unit": "s"},
                 "state": self.x.tolist(),
                 "values": {
@@ -125,9 +159,11 @@ class CheckedJacobian:
                 "jacobian": entries,
                 "verdict": self.verdict.value,
                 "notes": list(self.notes),
-            }
+            },
+            records=entries,
+            index=("of", "wrt"),
+            fault=disagrees if self.verdict is Verdict.DISAGREES else "",
         )
-        return found
 
 
 def checked_jacobian(

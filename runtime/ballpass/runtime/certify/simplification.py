@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
@@ -26,12 +25,14 @@ from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.quantity.grammar import quantity_words
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Simplification:
+class Simplification(Reported):
     """A simpler model compared with the reference model.
 
     Attributes
@@ -83,21 +84,18 @@ class Simplification:
             f"{PROMISED:.0%} of {self.members} parameter sets."
         )
 
-
-def rows(found: Simplification) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table: quantity, both values, change, and its 95 % bound."""
-    head = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
-    lines = []
-    for name in found.quantities:
-        factor, unit = table_unit(found.units[name])
-        both = (rounded(factor * values[name]) for values in (found.values, found.simpler_values))
-        lines.append((name, unit, *both, f"{100.0 * found.change[name]:+z.3g} %", percent(found.error[name])))
-    return head, lines
-
-
-def to_plain(found: Simplification) -> dict[str, Any]:
-    """Plain data for JSON."""
-    return {"simplification": {**asdict(found), "gain": found.gain}, "words": found.words}
+    def _report(self) -> Report:
+        heads = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
+        rows = []
+        for name in self.quantities:
+            factor, unit = table_unit(self.units[name])
+            both = (rounded(factor * values[name]) for values in (self.values, self.simpler_values))
+            rows.append((name, unit, *both, f"{100.0 * self.change[name]:+z.3g} %", percent(self.error[name])))
+        title = f"{self.title}; other: {self.simpler_title}"
+        meanings = "\n".join(f"{name}: {words}" for name, words in self.meanings.items())
+        table = ReportTable(title=title, heads=heads, rows=rows, right=heads[2:], caption=meanings)
+        facts = {"simplification": {**asdict(self), "gain": self.gain}, "words": self.words}
+        return Report(parts=(table, self.words), facts=facts)
 
 
 def measure_simplification(

@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from ballpass.runtime.contract.options import Check, CrankAngle, Instant, Option
-from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
-from ballpass.runtime.report.report import Report, ReportTable
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.jacobian_check import CheckedJacobian
@@ -39,47 +37,7 @@ State = Annotated[
 ]
 
 
-def _report(result: CheckedJacobian) -> Report:
-    """Entries with their check, and the notes; entries that are structurally zero are left out and counted."""
-    from ballpass.runtime.certify.certificate import Verdict
-
-    facts = result.to_dict()
-    entries = facts["jacobian"]
-    shown = [
-        entry
-        for entry in entries
-        if entry["verdict"] == Verdict.DISAGREES.value
-        or entry["value"] != 0.0
-        or entry["sides"]
-        or len(result.rows) == 1
-    ]
-    agreed = all(entry["verdict"] == Verdict.VERIFIED.value for entry in shown)  # the title says so for all
-    rows = []
-    for entry in shown:
-        value, second = (None if entry[key] is None else f"{entry[key]:z.7g}" for key in ("value", "second"))
-        if entry["sides"]:
-            value = "{:z.7g} or {:z.7g}".format(*entry["sides"])
-        verdict = [] if agreed else [entry["verdict"]]
-        unit = printed_unit(entry["unit"])
-        rows.append((entry["of"], entry["wrt"], value or "not finite", second or "", unit, *verdict))
-    table = ReportTable(
-        title=f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
-        heads=("quantity", "parameter", "derivative", "by differences", "unit", *([] if agreed else ["verdict"])),
-        rows=rows,
-        right=("derivative", "by differences"),
-    )
-    still = len(entries) - len(shown)
-    disagrees = "the two routes disagree; both numbers are shown. " + " ".join(result.notes)
-    return Report(
-        parts=(table, *([f"{still} more {'is' if still == 1 else 'are'} zero."] if still else []), *result.notes),
-        facts=facts,
-        records=entries,
-        index=("of", "wrt"),
-        fault=disagrees if result.verdict is Verdict.DISAGREES else "",
-    )
-
-
-@Question(name="jacobian", report=_report, stage="differentiate", runs=False)
+@Question(name="jacobian", stage="differentiate", runs=False)
 def checked_jacobian(
     model: PointModel,
     of: Of,

@@ -1,4 +1,4 @@
-"""The declaration of a question: its function, options, report, and how the command line shows it.
+"""The declaration of a question: its function, options, and how the command line shows it.
 
 A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
 overrides of the numbers; ``progress`` gets the part that is done.  Modules with heavy work are imported inside
@@ -17,7 +17,6 @@ from ballpass.runtime.contract.arguments import plain, typed
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
-from ballpass.runtime.report.report import Report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,6 @@ class Question:
     Attributes
     ----------
     name : of the command; the function's if there is none
-    report : of an answer
     stage : words of its progress
     needs : optional package without which there is no answer
     check : of values of the options: RequestError where they contradict each other
@@ -52,7 +50,6 @@ class Question:
     """
 
     name: str = ""
-    report: Callable[[Any], Report] = lambda answer: answer.report()
     stage: str = "simulate"
     needs: str = ""
     check: Callable[[Mapping[str, Any]], None] | None = None

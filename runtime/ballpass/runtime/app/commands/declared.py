@@ -256,11 +256,11 @@ def _answered(
     runs = question.digits and isinstance(model, LoadedModel) and model.manifest.integrated
     if not runs or values.get("recording") is not None:
         answer = at(None)
-        return answer, question.report(answer), None
+        return answer, answer.report(), None
     given = values.get("rtol")
     rtol = model.run_settings.rtol if given is None else given
-    answers, report = repeated(at, question.report, rtol)
-    return answers[0], report, uncertainties([to_plain(question.report(answer)) for answer in answers], rtol)
+    answers, report = repeated(at, lambda answer: answer.report(), rtol)
+    return answers[0], report, uncertainties([to_plain(answer.report()) for answer in answers], rtol)
 
 
 def _request(

@@ -11,7 +11,6 @@ from ballpass.runtime.app.commands.load_scene import generated_folder
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
-from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.show.progress import Progress
 
 if TYPE_CHECKING:
@@ -45,18 +44,6 @@ Members = Annotated[
 ]
 
 
-def _report(found: Trade | Simplification) -> Report:
-    from ballpass.runtime.certify.simplification import Simplification, rows, to_plain
-
-    if not isinstance(found, Simplification):
-        return found.report()
-    heads, lines = rows(found)
-    title = f"{found.title}; other: {found.simpler_title}"
-    meanings = "\n".join(f"{name}: {words}" for name, words in found.meanings.items())
-    table = ReportTable(title=title, heads=heads, rows=lines, right=heads[2:], caption=meanings)
-    return Report(parts=(table, found.words), facts=to_plain(found))
-
-
 def _figures(_model: AnyModel, found: Trade | Simplification, _parameters: Any) -> Iterator[tuple[str, Figure]]:
     from ballpass.runtime.certify.trade_report import Trade
     from ballpass.runtime.plot.trade import draw_trade
@@ -67,7 +54,7 @@ def _figures(_model: AnyModel, found: Trade | Simplification, _parameters: Any) 
         yield f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}", draw_trade(found, quantity)
 
 
-@Question(report=_report, stage="measuring", figures=_figures, always=True, requires="states")
+@Question(stage="measuring", figures=_figures, always=True, requires="states")
 def trade(
     model: AnyModel,
     *,
