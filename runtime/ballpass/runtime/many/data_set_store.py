@@ -24,6 +24,7 @@ from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import LOCK, refuse_other, replace_file, replaced
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.signals import Made
+from ballpass.runtime.solution.netcdf import create_variable
 
 #: Number of the layout of data sets.
 SCHEMA = 1
@@ -427,22 +428,15 @@ def write_netcdf(group: Any, path: Path) -> None:
     import h5py
 
     with replaced(path) as new, h5netcdf.File(new, "w") as file:
-        for key, fact in group.attrs.items():
-            file.attrs[key] = fact
+        file.attrs.update(group.attrs)
         for name, array in group.arrays():
             facts = dict(array.attrs)
             dimensions = facts.pop("_ARRAY_DIMENSIONS")
-            for dimension, length in zip(dimensions, array.shape, strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = length
             text = array.dtype.kind == "U"
-            if text:
-                variable = file.create_variable(name, dimensions, h5py.string_dtype())
-            else:
-                fill = {} if array.fill_value is None else {"fillvalue": array.fill_value}
-                variable = file.create_variable(name, dimensions, array.dtype, chunks=array.chunks, **fill)
-            for key, fact in facts.items():
-                variable.attrs[key] = fact
+            kind, how = (h5py.string_dtype(), {}) if text else (array.dtype, {"chunks": array.chunks})
+            if not text and array.fill_value is not None:
+                how["fillvalue"] = array.fill_value
+            variable = create_variable(file, name, dimensions, array.shape, kind, facts, **how)
             for first in range(0, array.shape[0], array.chunks[0]):
                 which = slice(first, first + array.chunks[0])
                 values = array[which]

@@ -6,7 +6,7 @@ In: variables with dimensions, units and descriptions.  Out: the bytes of a file
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,15 +40,26 @@ def netcdf_bytes(variables: Mapping[str, Variable], facts: Mapping[str, Any]) ->
 
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
-        for dimensions, values, _ in variables.values():
-            for dimension, length in zip(dimensions, values.shape, strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = length
         for name, (dimensions, values, attributes) in variables.items():
             kind = h5py.string_dtype() if values.dtype == object else values.dtype
-            variable = file.create_variable(name, dimensions, kind, data=values)
-            for key, text in attributes.items():
-                variable.attrs[key] = text
-        for key, fact in facts.items():
-            file.attrs[key] = fact
+            create_variable(file, name, dimensions, values.shape, kind, attributes, data=values)
+        file.attrs.update(facts)
     return memory.getvalue()
+
+
+def create_variable(
+    file: Any,
+    name: str,
+    dimensions: Sequence[str],
+    shape: tuple[int, ...],
+    kind: Any,
+    attributes: Mapping[str, Any],
+    **how: Any,
+) -> Any:
+    """A new variable of a file, and its dimensions where they are new."""
+    for dimension, length in zip(dimensions, shape, strict=True):
+        if dimension not in file.dimensions:
+            file.dimensions[dimension] = length
+    variable = file.create_variable(name, dimensions, kind, **how)
+    variable.attrs.update(attributes)
+    return variable

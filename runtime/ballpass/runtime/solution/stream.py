@@ -26,7 +26,7 @@ from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import asked_span
 from ballpass.runtime.request.sampling import checked_rate
 from ballpass.runtime.request.start import start_time
-from ballpass.runtime.solution.netcdf import seal
+from ballpass.runtime.solution.netcdf import create_variable, seal
 from ballpass.runtime.solution.simulate import simulate
 from ballpass.runtime.solution.solution import Solution, Statistics, contents
 
@@ -102,8 +102,7 @@ def _write(
         sums: dict[str, Any] = {name: None if None in found else sum(found) for name, found in each.items()}
         total = replace(parts[0], **sums)
         whole = replace(solution, statistics=total, reductions=None, steady_reductions=None)
-        for key, fact in contents(whole)[1].items():
-            file.attrs[key] = fact
+        file.attrs.update(contents(whole)[1])
     return total
 
 
@@ -114,13 +113,8 @@ def _append(file: Any, solution: Solution, done: int) -> None:
     if not done:
         file.dimensions["time"] = None  # it grows
         for name, (dimensions, values, attributes) in variables.items():
-            for dimension, size in zip(dimensions, values.shape, strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = size
             chunks = (min(rows, 2**14), *values.shape[1:]) if dimensions[0] == "time" else None
-            variable = file.create_variable(name, dimensions, values.dtype, chunks=chunks)
-            for key, text in attributes.items():
-                variable.attrs[key] = text
+            variable = create_variable(file, name, dimensions, values.shape, values.dtype, attributes, chunks=chunks)
             if dimensions[0] != "time":
                 variable[...] = values
     file.resize_dimension("time", done + rows)
