@@ -48,7 +48,7 @@ from ballpass.derive.requested import (
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, StateSwitch, Variable
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.manifest import TurningInfo
 
@@ -121,14 +121,14 @@ class System:
         return tuple(dict.fromkeys(i.turning for i in self.inputs if i.turning is not None))
 
     @property
-    def states(self) -> tuple[State, ...]:
+    def states(self) -> tuple[Variable, ...]:
         """Positions, then velocities."""
         positions = (
-            State(name=c.name, symbol=c.position, unit=c.unit, description=c.words[0], latex=c.latex)
+            Variable(name=c.name, symbol=c.position, unit=c.unit, description=c.words[0], latex=c.latex)
             for c in self.coordinates
         )
         velocities = (
-            State(
+            Variable(
                 name=c.velocity.name,
                 symbol=c.velocity,
                 unit=c.velocity_unit,

@@ -15,23 +15,10 @@ DRIVER_ANGLE = sp.Symbol("driver.angle", real=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """A run-time number: its scene path, SI unit, description, default [unit] and symbol."""
-
-    name: str
-    symbol: sp.Symbol
-    unit: str
-    description: str
-    latex: str
-    default: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
     """Held constant between breakpoints by the integrator; `kind` and fields as in `manifest.InputInfo`."""
 
     name: str
-    symbol: sp.Symbol
     kind: Literal["phase", "angle", "rate", "slope", "gate", "table", "table_rate", "border"]
     unit: str
     description: str
@@ -43,14 +30,19 @@ class Input:
     times: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
 
+    @property
+    def symbol(self) -> sp.Symbol:
+        """Symbol; that of a table is marked, since an output may have its name."""
+        marked = self.kind in ("slope", "table", "table_rate")
+        return sp.Symbol(f"input.{self.name}" if marked else self.name, real=True)
+
 
 def turned(
     turning: TurningInfo, description: str, latex: str, kind: Literal["phase", "angle", "rate"] = "phase"
 ) -> Input:
     """A turning at the reference time: its angle within a turn or with whole ones [rad], or its rate [rad/s]."""
     name, unit = f"{kind}.{turning.name}", "rad/s" if kind == "rate" else "rad"
-    symbol = sp.Symbol(name, real=True)
-    return Input(name=name, symbol=symbol, kind=kind, unit=unit, description=description, latex=latex, turning=turning)
+    return Input(name=name, kind=kind, unit=unit, description=description, latex=latex, turning=turning)
 
 
 def gate_of(
@@ -59,7 +51,6 @@ def gate_of(
     """1 while a turning, modulo a turn over `parts`, lies in one of some windows, else 0."""
     return Input(
         name=name,
-        symbol=sp.Symbol(name, real=True),
         kind="gate",
         unit="1",
         description=description,
@@ -130,14 +121,21 @@ class Coordinate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State:
-    """A state variable: a position [m] or a velocity [m/s]."""
+class Variable:
+    """A number with a symbol; as a state, a position [m] or a velocity [m/s]."""
 
     name: str
     symbol: sp.Symbol
     unit: str
     description: str
     latex: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter(Variable):
+    """A run-time number: its scene path, symbol, SI unit, description and default [unit]."""
+
+    default: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

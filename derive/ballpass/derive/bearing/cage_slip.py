@@ -34,7 +34,6 @@ def excess_slip(bearing: Bearing, names: Names) -> Input | None:
     of = f" of {bearing.name}" if bearing.name else ""
     return Input(
         name=f"{bearing.prefix}{CAGE_EXCESS_SLIP}",
-        symbol=sp.Symbol(f"input.{bearing.prefix}{CAGE_EXCESS_SLIP}", real=True),
         kind="table_rate",
         unit="1",
         description=f"Slip of the cage{of} beyond that of the last row",

@@ -27,7 +27,7 @@ from ballpass.derive.scene.records import (
     TableLoad,
     UnbalanceLoad,
 )
-from ballpass.derive.terms import TIME, Definition, components, symbol_of
+from ballpass.derive.terms import TIME, Definition, components, defined, symbol_of
 from ballpass.derive.variables import Input, turned
 from ballpass.runtime.contract.manifest import TurningInfo
 
@@ -114,20 +114,13 @@ def _within_times(load: Load, window: LoadWindow, full: RingLoad) -> RingLoad:
     """The gate is the slope of the table with the rows (start, start) and (end, end): one between, zero outside."""
     constants: tuple[Definition, ...] = ()
     if window.end is None:
-        end = Definition(
-            symbol=sp.Symbol(f"{load.path}.time_window.end", real=True),
-            expression=symbol_of(window.start) + FOR_EVER,
-            unit="s",
-            description="Time at which the load ends: never",
-            latex="t_{off}",
-        )
+        never = symbol_of(window.start) + FOR_EVER
+        end = defined(f"{load.path}.time_window.end", never, "s", "Time at which the load ends: never", "t_{off}")
         constants, edges = (end,), (window.start.path, end.symbol.name)
     else:
         edges = (window.start.path, window.end.path)
-    name = f"{load.label}.time_window"
     gate = Input(
-        name=name,
-        symbol=sp.Symbol(f"input.{name}", real=True),
+        name=f"{load.label}.time_window",
         kind="table_rate",
         unit="1",
         description="1 while the load acts, else 0",
@@ -140,26 +133,16 @@ def _within_times(load: Load, window: LoadWindow, full: RingLoad) -> RingLoad:
 
 def _unbalance(load: Load, law: UnbalanceLoad, shaft: Drive) -> RingLoad:
     """Centrifugal force m_u e_u omega^2 of a mass that turns with the shaft."""
-    amount = Definition(
-        symbol=sp.Symbol(f"{load.path}.centrifugal_force", real=True),
-        expression=symbol_of(law.mass) * symbol_of(law.eccentricity) * shaft.speed**2,
-        unit="N",
-        description="Centrifugal force of the unbalance",
-        latex="F_u",
-    )
+    pull = symbol_of(law.mass) * symbol_of(law.eccentricity) * shaft.speed**2
+    amount = defined(f"{load.path}.centrifugal_force", pull, "N", "Centrifugal force of the unbalance", "F_u")
     towards = shaft.angle + symbol_of(law.angle)
     return RingLoad(force=(amount.symbol * sp.cos(towards), amount.symbol * sp.sin(towards)), constants=(amount,))
 
 
 def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
     words = "Angle of the harmonic load at the reference time"
-    angular = Definition(
-        symbol=sp.Symbol(f"{load.path}.angular_frequency", real=True),
-        expression=2 * sp.pi * symbol_of(law.frequency),
-        unit="rad/s",
-        description="Angular frequency of the load",
-        latex=r"\Omega",
-    )
+    rate = 2 * sp.pi * symbol_of(law.frequency)
+    angular = defined(f"{load.path}.angular_frequency", rate, "rad/s", "Angular frequency of the load", r"\Omega")
 
     def wave(ending: str, at_start: SceneNumber, words: str) -> tuple[Input, Definition]:
         axis = ending.removeprefix(".")
@@ -171,14 +154,9 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
             rate=angular.symbol.name,
         )
         turning = turned(angle, words, rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0")
-        harmonic = Definition(
-            symbol=sp.Symbol(f"{load.label}.wave{ending}", real=True),
-            expression=sp.cos(turning.symbol + angular.symbol * TIME),
-            unit="1",
-            description=f"Harmonic of the load{f' along {axis}' if axis else ''}",
-            latex=f"w_{axis}" if axis else "w",
-        )
-        return turning, harmonic
+        cosine = sp.cos(turning.symbol + angular.symbol * TIME)
+        words = f"Harmonic of the load{f' along {axis}' if axis else ''}"
+        return turning, defined(f"{load.label}.wave{ending}", cosine, "1", words, f"w_{axis}" if axis else "w")
 
     if isinstance(law.phase, tuple):
         both = [wave(f".{a}", at, f"{words} along {a}") for a, at in zip("xy", law.phase, strict=True)]
@@ -205,29 +183,24 @@ def _over_angle(load: Load, law: TableLoad, shaft: Drive) -> RingLoad:
 
 def _over_time(load: Load, law: TableLoad) -> RingLoad:
     inputs: list[Input] = []
-    times = tuple(q.path for q in law.rows)
 
     def column(axis: str, values: tuple[SceneNumber, ...]) -> sp.Expr:
-        names = tuple(q.path for q in values)
         value = Input(
             name=f"{load.label}.{axis}",
-            symbol=sp.Symbol(f"input.{load.label}.{axis}", real=True),
             kind="table",
             unit="N",
             description=f"Value of the load table along {axis} at the reference time",
             latex=rf"F_{{0,{axis}}}",
-            times=times,
-            values=names,
+            times=tuple(q.path for q in law.rows),
+            values=tuple(q.path for q in values),
         )
-        slope = Input(
+        slope = replace(
+            value,
             name=f"{load.label}.{axis}_rate",
-            symbol=sp.Symbol(f"input.{load.label}.{axis}_rate", real=True),
             kind="table_rate",
             unit="N/s",
             description=f"Slope of the load table along {axis} at the reference time",
             latex=rf"\dot F_{{0,{axis}}}",
-            times=times,
-            values=names,
         )
         inputs.extend((value, slope))
         return value.symbol + slope.symbol * TIME

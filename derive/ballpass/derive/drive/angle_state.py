@@ -9,7 +9,7 @@ import sympy as sp
 
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
-from ballpass.derive.terms import Definition, Smoothness
+from ballpass.derive.terms import Smoothness, defined
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
 
 #: Of a window without width, or without a gap [1].
@@ -31,21 +31,13 @@ class AngleState(Drive):
         """Value over the angle after the first knot, without whole periods."""
         knots, heights = ([sp.Symbol(path, real=True) for path in column] for column in (angles, values))
         turn, past = 2 * turns * sp.pi, DRIVER_ANGLE - knots[0]
-        behind = Definition(
-            symbol=sp.Symbol(f"{name}.angle", real=True),
-            expression=past - turn * sp.floor(past / turn, evaluate=False),
-            unit="rad",
-            description=f"Driver's angle behind the first row of the table of {name}, within a turn",
-            latex=rf"\theta_{{\mathrm{{{name}}}}}",
-        )
+        within = past - turn * sp.floor(past / turn, evaluate=False)
+        words = f"Driver's angle behind the first row of the table of {name}, within a turn"
+        behind = defined(f"{name}.angle", within, "rad", words, rf"\theta_{{\mathrm{{{name}}}}}")
         places = [knot - knots[0] for knot in knots]
-        value = Definition(
-            symbol=sp.Symbol(f"{name}.value", real=True),
-            expression=piecewise_linear(behind.symbol, [*places, turn], [*heights, heights[0]]),
-            unit=unit,
-            description=f"Value of the table of {name}",
-            latex=rf"T_{{\mathrm{{{name}}}}}",
-        )
+        height = piecewise_linear(behind.symbol, [*places, turn], [*heights, heights[0]])
+        latex = rf"T_{{\mathrm{{{name}}}}}"
+        value = defined(f"{name}.value", height, unit, f"Value of the table of {name}", latex)
         kinks = ((f"{name}.table", Smoothness.KINKED),)
         return OverAngle(value=value.symbol, definitions=(behind, value), smoothness=kinks)
 
@@ -62,13 +54,8 @@ def window_gate(
     """
     edges = [_edges(name, number, angle, *window) for number, window in enumerate(windows, start=1)]
     inside = [sp.Piecewise((1, edge.function > edge.border.symbol), (0, True)) for edge in edges]
-    gate = Definition(
-        symbol=sp.Symbol(f"gate.{name}", real=True),
-        expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
-        unit="1",
-        description=words,
-        latex=latex,
-    )
+    any_of_them = sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0]
+    gate = defined(f"gate.{name}", any_of_them, "1", words, latex)
     return OverAngle(
         value=gate.symbol,
         inputs=tuple(edge.border for edge in edges),
@@ -85,7 +72,6 @@ def _edges(name: str, number: int, angle: tuple[sp.Expr, sp.Expr], start: str, e
     return StateSwitch(
         border=Input(
             name=path,
-            symbol=sp.Symbol(path, real=True),
             kind="border",
             unit="rad",
             description=f"Border of the switching function of window {number} of {name}",

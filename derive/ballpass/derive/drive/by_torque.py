@@ -6,19 +6,14 @@ import sympy as sp
 
 from ballpass.derive.drive.angle_state import AngleState, driver_coordinate
 from ballpass.derive.scene.records import Driver
-from ballpass.derive.terms import Definition, symbol_of
+from ballpass.derive.terms import defined, symbol_of
 
 
 def by_torque(driver: Driver) -> AngleState:
     """Drive of a driver with a law of its torque; speed and angle are the initial ones."""
     angle = driver_coordinate()
-    torque = Definition(
-        symbol=sp.Symbol("driver.torque", real=True),
-        expression=driver.torque.torque(angle.velocity),
-        unit="N*m",
-        description="Torque of the drive on the driven body, counter-clockwise",
-        latex="M_d",
-    )
+    words = "Torque of the drive on the driven body, counter-clockwise"
+    torque = defined("driver.torque", driver.torque.torque(angle.velocity), "N*m", words, "M_d")
     return AngleState(
         speed=angle.velocity,
         acceleration=angle.acceleration,

@@ -50,7 +50,6 @@ class KnownDrive(Drive):
         def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
             return Input(
                 name=f"{name}{ending}",
-                symbol=sp.Symbol(f"input.{name}{ending}", real=True),
                 kind=kind,
                 unit=unit,
                 description=f"{words} of the table of {name} at the reference time",
@@ -90,7 +89,6 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     rate = turned(turning, f"Speed of {body} at the reference time", r"\omega_{1,0}", "rate")
     slope = Input(
         name=DRIVER_ACCELERATION,
-        symbol=sp.Symbol("input.driver.acceleration", real=True),
         kind="slope",
         unit="rad/s^2",
         description="Slope of the table of the driver's speed over time",

@@ -7,15 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import (
-    alignment_info,
-    catalogue_info,
-    duty_info,
-    info_of,
-    lubrication_info,
-    signature,
-    versions,
-)
+from ballpass.derive.emit.signature import duty_info, info_of, life_info, signature, versions
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.plausible_ranges import usual_ranges
@@ -44,7 +36,7 @@ def describe(
         ),
         relations=value_relations(scene),
         usual=usual_ranges(scene),
-        constants=tuple(info_of(mf.VariableInfo, c) for c in functions.constants),
+        constants=functions.constants,
         states=tuple(info_of(mf.VariableInfo, s) for s in system.states),
         coordinates=tuple(info_of(mf.CoordinateInfo, c, velocity=c.velocity.name) for c in system.coordinates),
         initial=system.initial,
@@ -132,9 +124,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
                 law=bearing.damping.law,
                 **({} if law is None else {"in_deflection": law.in_deflection.value, "in_rate": law.in_rate.value}),
             ),
-            catalogue=catalogue_info(bearing),
-            lubrication=lubrication_info(bearing),
-            alignment=alignment_info(bearing),
+            **life_info(bearing),
             element=bearing.element,
             inner_stands=bearing.inner_body == FRAME or (scene.shaft is not None and scene.shaft.ring == "outer"),
         )

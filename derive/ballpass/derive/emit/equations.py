@@ -14,7 +14,7 @@ from ballpass.derive.bearing.elements.hertz import ellipticity
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME, Definition
-from ballpass.derive.variables import Input, Parameter, State
+from ballpass.derive.variables import Input, Variable
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.show import html
 
@@ -38,7 +38,7 @@ class _Printer:
 
     def __init__(self, system: System) -> None:
         names: dict[sp.Symbol, str] = {TIME: "t"}
-        named: tuple[Parameter | Input | State, ...] = (*system.parameters, *system.inputs, *system.states)
+        named: tuple[Input | Variable, ...] = (*system.parameters, *system.inputs, *system.states)
         names |= {n.symbol: n.latex for n in named}
         definitions = [*system.constants, *system.definitions]
         for bearing in system.bearings:

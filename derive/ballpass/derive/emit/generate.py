@@ -14,13 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballpass.derive.emit.signature import (
-    alignment_info,
-    catalogue_info,
     duty_info,
     folder_of,
     fresh_manifest,
     info_of,
-    lubrication_info,
+    life_info,
     signature,
     source_key,
 )
@@ -213,13 +211,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
         run=info_of(mf.RunInfo, scene.run),
         duty=duty_info(scene),
         bearings=tuple(
-            replace(
-                info,
-                catalogue=catalogue_info(bearing),
-                lubrication=lubrication_info(bearing),
-                alignment=alignment_info(bearing),
-            )
-            for info, bearing in zip(present.bearings, scene.bearings, strict=True)
+            replace(info, **life_info(bearing)) for info, bearing in zip(present.bearings, scene.bearings, strict=True)
         ),
     )
     if updated != present or source:

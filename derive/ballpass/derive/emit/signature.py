@@ -83,23 +83,15 @@ def info_of(kind: type[T], record: object, **others: Any) -> T:
     return kind(**{name: getattr(record, name) for name in names if hasattr(record, name)}, **others)
 
 
-def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
-    """What a bearing takes from a catalogue."""
-    catalogue = bearing.catalogue
-    if catalogue is None:
-        return None
-    least, most = catalogue.clearance_range or (None, None)
-    return info_of(mf.CatalogueInfo, catalogue, clearance_least=least, clearance_most=most)
-
-
-def lubrication_info(bearing: Bearing) -> mf.LubricationInfo | None:
-    """Lubricant film and contamination of a bearing."""
-    return None if bearing.lubrication is None else info_of(mf.LubricationInfo, bearing.lubrication)
-
-
-def alignment_info(bearing: Bearing) -> mf.AlignmentInfo | None:
-    """Misalignment and shaft of a bearing."""
-    return None if bearing.alignment is None else info_of(mf.AlignmentInfo, bearing.alignment)
+def life_info(bearing: Bearing) -> dict[str, Any]:
+    """What a bearing's life needs and its equations do not: catalogue, lubricant, misalignment."""
+    catalogue, lubrication, alignment = bearing.catalogue, bearing.lubrication, bearing.alignment
+    least, most = (catalogue and catalogue.clearance_range) or (None, None)
+    return {
+        "catalogue": catalogue and info_of(mf.CatalogueInfo, catalogue, clearance_least=least, clearance_most=most),
+        "lubrication": lubrication and info_of(mf.LubricationInfo, lubrication),
+        "alignment": alignment and info_of(mf.AlignmentInfo, alignment),
+    }
 
 
 def duty_info(scene: Scene) -> tuple[mf.DutyInfo, ...]:

@@ -27,6 +27,7 @@ from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract.arguments import typed
+from ballpass.runtime.contract.manifest import VariableInfo
 from ballpass.runtime.show.short import ShortRepr
 
 #: What no compiled run calls.
@@ -36,26 +37,16 @@ _EQUATIONS = ("rhs", "mass_matrix")
 Balls = dict[str, list[Visitor]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DerivedConstant:
-    """Entry of the vector c: a named constant of the system, or a subexpression of parameters (name ``h1``, ``h2``
-    ...)."""
-
-    name: str
-    unit: str
-    description: str
-    latex: str
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class LoweredFunctions(ShortRepr):
     """Named functions in the order they are written, with a line for people each.
 
+    `constants` are the vector c: named constants of the system, and subexpressions of parameters (``h1``, ``h2`` ...).
     `equations` and `jacobians` go to files of their own, read and compiled when one of them is first asked for: the
     stepper has the right-hand side in its kernels.  `groups` says which quantities are differentiated.
     """
 
-    constants: tuple[DerivedConstant, ...]
+    constants: tuple[VariableInfo, ...]
     functions: tuple[Described, ...]
     equations: tuple[Described, ...]
     jacobians: tuple[Described, ...]
@@ -211,13 +202,10 @@ class _Lowering:
         rhs = bodies[0][1]["xdot"] if system.coordinates else None
         groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ([], [])
         named = [
-            DerivedConstant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
+            VariableInfo(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants
         ]
-        found = [
-            DerivedConstant(name=f"h{k + 1}", unit="", description=str(e), latex="")
-            for k, e in enumerate(self._hoisted)
-        ]
+        found = [VariableInfo(name=f"h{k}", unit="", description=str(e)) for k, e in enumerate(self._hoisted, start=1)]
         return LoweredFunctions(
             constants=(*named, *found),
             functions=tuple(made),

@@ -80,15 +80,29 @@ def displaced(motion: Motion, by: Motion | None, sign: int) -> Motion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pose:
+class Turn:
+    """How a body is turned, and turns.
+
+    Attributes
+    ----------
+    cos, sin : of the angle of the body's x axis from +x [1]
+    rate : angular velocity, counter-clockwise [rad/s]; structurally zero for a slider on a fixed guide
+    acceleration : angular acceleration [rad/s^2]
+    """
+
+    cos: sp.Expr
+    sin: sp.Expr
+    rate: sp.Expr
+    acceleration: sp.Expr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose(Turn):
     """Where a body is and how it moves.
 
     Attributes
     ----------
     body : name of the body
-    cos, sin : of the angle of the body's x axis from +x [1]
-    rate : angular velocity, counter-clockwise [rad/s]; structurally zero for a slider on a fixed guide
-    acceleration : angular acceleration [rad/s^2]
     anchor : the body point, in body axes, from which other points are reached [m]
     anchor_motion : its motion
     origin : motion of the body's origin
@@ -96,10 +110,6 @@ class Pose:
     """
 
     body: str
-    cos: sp.Expr
-    sin: sp.Expr
-    rate: sp.Expr
-    acceleration: sp.Expr
     anchor: Pair
     anchor_motion: Motion
     origin: Motion
@@ -179,26 +189,23 @@ class Ledger:
         return x, y
 
 
-def place(
-    ledger: Ledger,
-    mechanism: Mechanism,
-    body: str,
-    *,
-    cos: sp.Expr,
-    sin: sp.Expr,
-    rate: sp.Expr,
-    acceleration: sp.Expr,
-    anchor: Pair,
-    anchor_motion: Motion,
-) -> Pose:
+def name_turn(ledger: Ledger, body: str, cos: sp.Expr, sin: sp.Expr, mark: str) -> Pair:
+    """Name cosine and sine of a body's angle."""
+    return (
+        ledger.name(f"body.{body}.cos", cos, "1", f"cosine of the angle of {body}", f"c_{{{mark}}}"),
+        ledger.name(f"body.{body}.sin", sin, "1", f"sine of the angle of {body}", f"s_{{{mark}}}"),
+    )
+
+
+def place(ledger: Ledger, mechanism: Mechanism, body: str, turn: Turn, anchor: Pair, anchor_motion: Motion) -> Pose:
     """The `Pose` of a moving body; the acceleration of its centre of mass gets names for the equations of motion."""
     center = components(mechanism.body(body).center_of_mass)
     bare = Pose(
         body=body,
-        cos=cos,
-        sin=sin,
-        rate=rate,
-        acceleration=acceleration,
+        cos=turn.cos,
+        sin=turn.sin,
+        rate=turn.rate,
+        acceleration=turn.acceleration,
         anchor=anchor,
         anchor_motion=anchor_motion,
         origin=anchor_motion,

@@ -21,10 +21,12 @@ from ballpass.derive.mechanism.kinematics import (
     Pair,
     Play,
     Pose,
+    Turn,
     body_point,
     displaced,
     frame_pose,
     joint_point,
+    name_turn,
     place,
     subscript,
 )
@@ -173,8 +175,7 @@ def check_assembly(
 
 def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, drive: Drive, play: Play) -> Pose:
     mark = subscript(body)
-    cos = ledger.define(f"body.{body}.cos", sp.cos(drive.angle), "1", f"cosine of the angle of {body}", f"c_{{{mark}}}")
-    sin = ledger.define(f"body.{body}.sin", sp.sin(drive.angle), "1", f"sine of the angle of {body}", f"s_{{{mark}}}")
+    cos, sin = name_turn(ledger, body, sp.cos(drive.angle), sp.sin(drive.angle), mark)
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
     acceleration = ledger.define(
         f"body.{body}.angular_acceleration",
@@ -185,17 +186,8 @@ def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str
     )
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
-    return place(
-        ledger,
-        mechanism,
-        body,
-        cos=cos,
-        sin=sin,
-        rate=drive.speed,
-        acceleration=acceleration,
-        anchor=joint_point(mechanism, driver, body),
-        anchor_motion=pivot,
-    )
+    turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration)
+    return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot)
 
 
 def _points(mechanism: Mechanism, poses: Mapping[str, Pose]) -> tuple[PlacedPoint, ...]:

@@ -99,13 +99,7 @@ def swing_of(linkage: Linkage, body: str) -> Swing:
     constants = (
         (turns, Turns(pose.cos, pose.sin, *positions), "1", f"Turns of the {body} in a turn of the driver", "N"),
         (mean, Mean(pose.cos, pose.sin, turns, *positions), "rad", f"Mean of the rest of the {body}'s angle", "m"),
-        (
-            at_start,
-            Ideal(swing, start, *positions),
-            "rad",
-            f"Swing of the {body} at the start, ideal",
-            "s^0",
-        ),
+        (at_start, Ideal(swing, start, *positions), "rad", f"Swing of the {body} at the start, ideal", "s^0"),
     )
     rest = mean + sp.atan2(pose.sin * cos - pose.cos * sin, pose.cos * cos + pose.sin * sin)
     words = f"Angle of the {body} less its whole turns with the driver"

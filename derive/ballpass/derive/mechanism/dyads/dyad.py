@@ -29,6 +29,7 @@ from ballpass.derive.mechanism.kinematics import (
     dot,
     joint_point,
     name_joint,
+    name_turn,
     subscript,
     subtract,
 )
@@ -233,16 +234,10 @@ def name_span(ledger: Ledger, body: str, vector: Pair) -> Pair:
     )
 
 
-def name_turn(ledger: Ledger, body: str, vector: Pair, span: Pair, length: sp.Expr) -> Pair:
+def turn_by_span(ledger: Ledger, body: str, vector: Pair, span: Pair, length: sp.Expr) -> Pair:
     """Cosine and sine of the body's angle: `vector` in the plane divided by `span` in body axes."""
-    mark = subscript(body)
-    cos = ledger.define(f"body.{body}.cos", dot(span, vector) / length**2, "1", _angle("cosine", body), f"c_{{{mark}}}")
-    sin = ledger.define(f"body.{body}.sin", cross(span, vector) / length**2, "1", _angle("sine", body), f"s_{{{mark}}}")
-    return cos, sin
-
-
-def _angle(function: str, body: str) -> str:
-    return f"{function} of the angle of {body}"
+    cos, sin = dot(span, vector) / length**2, cross(span, vector) / length**2
+    return name_turn(ledger, body, cos, sin, subscript(body))
 
 
 def name_rate(ledger: Ledger, body: str, rate: sp.Expr) -> sp.Expr:

@@ -30,10 +30,12 @@ from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Play,
     Pose,
+    Turn,
     add,
     cross,
     dot,
     joint_point,
+    name_turn,
     place,
     quarter_turn,
     scale,
@@ -90,12 +92,7 @@ class RPR(Dyad):
         )
         along = subtract(scale(reach, span), scale(offset, quarter_turn(span)))
         direction = name_direction(ledger, guide, scale(1 / square, along))
-        cos = ledger.name(
-            f"body.{first}.cos", dot(axis, direction), "1", f"cosine of the angle of {first}", f"c_{{{mark}}}"
-        )
-        sin = ledger.name(
-            f"body.{first}.sin", cross(axis, direction), "1", f"sine of the angle of {first}", f"s_{{{mark}}}"
-        )
+        cos, sin = name_turn(ledger, first, dot(axis, direction), cross(axis, direction), mark)
         travel = name_travel(ledger, guide, second, "", reach - dot(axis, between))
 
         # d differentiated: w J d + s' t = r; cross product with t and scalar product with d.
@@ -110,18 +107,9 @@ class RPR(Dyad):
         gap = name_gap(ledger, guide, "a", closure, "m/s^2")
         acceleration = name_acceleration(ledger, first, cross(direction, gap) / reach)
 
+        turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration)
         lever, block = (
-            place(
-                ledger,
-                mechanism,
-                body,
-                cos=cos,
-                sin=sin,
-                rate=rate,
-                acceleration=acceleration,
-                anchor=start,
-                anchor_motion=hinge,
-            )
+            place(ledger, mechanism, body, turn, start, hinge)
             for body, start, hinge in zip(self.bodies, starts, hinges, strict=True)
         )
         # Where the hinges come to lie on each other there is no direction: d by the arms that could part them.

@@ -26,14 +26,15 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_rate,
     name_span,
     name_travel,
-    name_turn,
     span_length,
+    turn_by_span,
 )
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
     Play,
     Pose,
+    Turn,
     add,
     carried,
     cross,
@@ -106,7 +107,7 @@ class RRP(Dyad):
         )
         travel = name_travel(ledger, guide_joint, slider, "", reach - dot(direction, to_path))
         v = name_span(ledger, rod, add(scale(offset, normal), scale(reach, direction)))
-        cos, sin = name_turn(ledger, rod, v, span, length)
+        cos, sin = turn_by_span(ledger, rod, v, span, length)
 
         # P + v = base + s t, differentiated: w J v − s' t = r; cross product with t and scalar product with v.
         fellow = carried(path, scale(travel, direction), host.rate, host.acceleration)
@@ -130,28 +131,9 @@ class RRP(Dyad):
             ),
         )
 
-        rod_pose = place(
-            ledger,
-            mechanism,
-            rod,
-            cos=cos,
-            sin=sin,
-            rate=rate,
-            acceleration=acceleration,
-            anchor=start,
-            anchor_motion=hinge,
-        )
-        slider_pose = place(
-            ledger,
-            mechanism,
-            slider,
-            cos=host.cos,
-            sin=host.sin,
-            rate=host.rate,
-            acceleration=host.acceleration,
-            anchor=slider_inner,
-            anchor_motion=joint_motion,
-        )
+        turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration)
+        rod_pose = place(ledger, mechanism, rod, turn, start, hinge)
+        slider_pose = place(ledger, mechanism, slider, host, slider_inner, joint_motion)
         guide = Guide(
             joint=guide_joint,
             host=host.body,

@@ -24,13 +24,14 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_hinge,
     name_rate,
     name_span,
-    name_turn,
     span_length,
+    turn_by_span,
 )
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Play,
     Pose,
+    Turn,
     add,
     carried,
     dot,
@@ -98,7 +99,7 @@ class RRR(Dyad):
         )
         v1, v2 = (name_span(ledger, body, vector) for body, vector in zip(bodies, vectors, strict=True))
         turns = [
-            name_turn(ledger, body, vector, span, length)
+            turn_by_span(ledger, body, vector, span, length)
             for body, vector, (_, span), length in zip(bodies, (v1, v2), spans, (one, two), strict=True)
         ]
 
@@ -120,18 +121,10 @@ class RRR(Dyad):
 
         name_joint(ledger, inner, carried(hinges[0], v1, rates[0], accelerations[0]))
         first, second = (
-            place(
-                ledger,
-                mechanism,
-                body,
-                cos=turns[i][0],
-                sin=turns[i][1],
-                rate=rates[i],
-                acceleration=accelerations[i],
-                anchor=spans[i][0],
-                anchor_motion=hinges[i],
+            place(ledger, mechanism, body, Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration), start, hinge)
+            for body, (cos, sin), rate, acceleration, (start, _), hinge in zip(
+                bodies, turns, rates, accelerations, spans, hinges, strict=True
             )
-            for i, body in enumerate(bodies)
         )
         return Placement(
             dyad=self,

@@ -63,7 +63,6 @@ class Stop(Law):
         )
         border = Input(
             name=f"border.{label}",
-            symbol=sp.Symbol(f"border.{label}", real=True),
             kind="border",
             unit=unit,
             description=f"Border of the compression of the stop {name}",
