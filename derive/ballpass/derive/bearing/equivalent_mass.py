@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing, EquivalentMass
-from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import FRAME, Mechanism
 from ballpass.derive.terms import components, symbol_of
 
@@ -36,17 +36,13 @@ def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
         if j.name != joint.name and crank.name in j.bodies
     ]
     if len(ends) != 1:
-        raise SceneError(
-            [
-                Fault(
-                    key=f"{bearing.path}.inner_ring.equivalent_mass",
-                    problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
-                    given=f"{len(ends)} further joints",
-                    allowed="a crank with exactly two joints",
-                    remedy=f'give the mass itself: [{bearing.path}.inner_ring] mass = "0.4 kg"',
-                )
-            ]
-        )
+        raise Fault(
+            key=f"{bearing.path}.inner_ring.equivalent_mass",
+            problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
+            given=f"{len(ends)} further joints",
+            allowed="a crank with exactly two joints",
+            remedy=f'give the mass itself: [{bearing.path}.inner_ring] mass = "0.4 kg"',
+        ).error()
     near, far = components(crank.point(joint.points[side])), components(crank.point(ends[0]))
     center = components(crank.center_of_mass)
     arm = (far[0] - near[0], far[1] - near[1])

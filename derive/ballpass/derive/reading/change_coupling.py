@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import FRAME
 from ballpass.derive.scene.units import parse_quantity
 
@@ -73,11 +73,10 @@ def _two_way(table: dict[str, Any], *, alone: bool, first: bool) -> dict[str, An
 
 
 def _refuse(problem: str, allowed: str) -> None:
-    fault = Fault(
+    raise Fault(
         key="bearing",
         problem=f"there is no such variant of the scene: {problem}",
         given="this scene",
         allowed=allowed,
         remedy="write the simpler scene yourself and name its file",
-    )
-    raise SceneError([fault])
+    ).error()

@@ -6,7 +6,7 @@ In: a scene, the path of a number, the text given for it.  Out: the range of the
 from __future__ import annotations
 
 from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
-from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import Scene
 from ballpass.derive.scene.table import listing
 from ballpass.derive.scene.units import show
@@ -37,14 +37,10 @@ def clearance_of_group(scene: Scene, path: str, written: str) -> tuple[float, fl
     kind = bearing_types().get(catalogue.designation) if catalogue is not None else None
     if catalogue is None or kind is None:
         allowed, remedy = "a group where the scene names a designation", "write the clearance as a length"
-        raise SceneError(
-            [Fault(key=path, problem="no bore is known", given=show(written), allowed=allowed, remedy=remedy)]
-        )
+        raise Fault(key=path, problem="no bore is known", given=show(written), allowed=allowed, remedy=remedy).error()
     span = kind.clearance(written)
     if span is None:
         problem, allowed = no_group(kind)
-        raise SceneError(
-            [Fault(key=path, problem=problem, given=show(written), allowed=allowed, remedy="name one of them")]
-        )
+        raise Fault(key=path, problem=problem, given=show(written), allowed=allowed, remedy="name one of them").error()
     least, middle, most = (um / 1e6 - catalogue.mounting_loss for um in (span[0], sum(span) / 2.0, span[1]))
     return least, middle, most

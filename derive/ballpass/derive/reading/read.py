@@ -142,15 +142,14 @@ def _copy_of(file: Path) -> str:
 
 
 def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) -> SceneError:
-    fault = Fault(
+    return Fault(
         key="",
         problem=f"the scene file cannot be read: {problem}",
         given=show(str(file), 200),
         allowed="",
         remedy=remedy,
         line=line,
-    )
-    return SceneError([fault], source=file)
+    ).error(file)
 
 
 def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -206,15 +205,14 @@ def _scene(
 def _parse(text: str, source: str | None) -> dict[str, Any]:
     deep = deep_key(text)
     if deep is not None:
-        fault = Fault(
+        raise Fault(
             key="",
             problem="a key with more than 64 dots",
             given=show(text.split("\n")[deep - 1].strip()),
             allowed="keys of a few parts, as in mechanism.bodies.crank",
             remedy="check whether this is a scene file (TOML)",
             line=deep,
-        )
-        raise SceneError([fault], source=source)
+        ).error(source)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -223,7 +221,7 @@ def _parse(text: str, source: str | None) -> dict[str, Any]:
         place = re.search(r"\(at line (\d+), column (\d+)\)", message)
         lines = text.split("\n")
         line = int(place.group(1)) if place else max(len(lines), 1)
-        fault = Fault(
+        raise Fault(
             key="",
             problem=f"this is not TOML: {message}",
             given=show(lines[line - 1].strip()) if 0 < line <= len(lines) else "",
@@ -232,8 +230,7 @@ def _parse(text: str, source: str | None) -> dict[str, Any]:
             if Path(source or "").suffix in (".csv", ".dat", ".tsv", ".txt")
             else "check quotes, brackets and commas in this line and in the one before it",
             line=line,
-        )
-        raise SceneError([fault], source=source) from None
+        ).error(source) from None
 
 
 def _read(root: Table, name: str) -> Scene:

@@ -118,17 +118,13 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
     """
     path, equals, value = split_setting(text)
     if not equals:
-        raise SceneError(
-            [
-                Fault(
-                    key=path,
-                    problem="an override without a value",
-                    given=show(text),
-                    allowed="PATH=VALUE",
-                    remedy='write the value with its unit after "=", as in "bearing.clearance=20 um"',
-                )
-            ]
-        )
+        raise Fault(
+            key=path,
+            problem="an override without a value",
+            given=show(text),
+            allowed="PATH=VALUE",
+            remedy='write the value with its unit after "=", as in "bearing.clearance=20 um"',
+        ).error()
     check_path(scene, path)
     group = clearance_of_group(scene, path, value)
     if group is not None:

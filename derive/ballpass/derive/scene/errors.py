@@ -50,6 +50,14 @@ class Fault:
         details = (("given", self.given), ("allowed", self.allowed), ("remedy", self.remedy))
         return "\n".join([headline, *(f"  {word}: {_shown(text, LONGEST_PART)}" for word, text in details if text)])
 
+    def error(self, source: str | Path | None = None) -> SceneError:
+        """An error of this fault alone."""
+        return SceneError([self], source)
+
+    def of_linkage(self) -> LinkageError:
+        """The same of a linkage."""
+        return LinkageError([self])
+
 
 def _shown(text: str, most: int) -> str:
     """A text that is safe for a terminal: names in a file may be very long or hold escape sequences."""

@@ -33,7 +33,7 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import Joint, Mechanism
 from ballpass.derive.terms import symbol_of
 
@@ -173,17 +173,13 @@ def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tu
     start = joint_point(mechanism, outer, body)
     span = subtract(joint_point(mechanism, inner, body), start)
     if span[0].is_zero and span[1].is_zero:
-        raise LinkageError(
-            [
-                Fault(
-                    key=f"mechanism.bodies.{body}.points",
-                    problem=f"joints {outer.name} and {inner.name} sit on the same point of {body}",
-                    given=f"points {outer.point(body)} and {inner.point(body)}",
-                    allowed="two points at a distance",
-                    remedy="give one of them another place",
-                )
-            ]
-        )
+        raise Fault(
+            key=f"mechanism.bodies.{body}.points",
+            problem=f"joints {outer.name} and {inner.name} sit on the same point of {body}",
+            given=f"points {outer.point(body)} and {inner.point(body)}",
+            allowed="two points at a distance",
+            remedy="give one of them another place",
+        ).of_linkage()
     return start, span
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
-from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Joint
@@ -37,14 +37,13 @@ class JointMotion(Pathway):
         if joint is None or joint.kind != self.kind:
             fits = [name for name, other in joints.items() if other.kind == self.kind]
             given = "there is no such joint" if joint is None else f"this joint is {joint.kind}"
-            fault = Fault(
+            raise Fault(
                 key=f"mechanism.{force.table}.{force.name}.joint",
                 problem=f"{given}, and [mechanism.{force.table}] is for {self.kind} joints",
                 given=f'"{self.joint}"',
                 allowed=", ".join(fits) or f"nothing: the linkage has no {self.kind} joint",
                 remedy="name one of these" if joint is None else f"write [mechanism.{self.other}.{force.name}]",
-            )
-            raise LinkageError([fault])
+            ).of_linkage()
         return self.along(joint, setting)
 
     @abstractmethod

@@ -11,7 +11,7 @@ from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
-from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
 from ballpass.derive.variables import Output
@@ -54,14 +54,13 @@ class TwoPoints(Pathway):
         ends = set(zip(self.bodies, self.points, strict=True))
         for joint in mechanism.joints:
             if joint.kind == "revolute" and set(zip(joint.bodies, joint.points, strict=True)) == ends:
-                fault = Fault(
+                raise Fault(
                     key=f"mechanism.{force.table}.{force.name}.points",
                     problem=f"joint {joint.name} keeps the two points together: the line between them has no direction",
                     given=" and ".join(".".join(end) for end in sorted(ends)),
                     allowed="two points at a distance",
                     remedy="give another point of one body; for a spring that turns, [mechanism.torsion_springs.NAME]",
-                )
-                raise LinkageError([fault])
+                ).of_linkage()
 
     def words(self) -> str:
         """The two points."""
