@@ -338,10 +338,7 @@ class QuantityFunction:
             duration=self._request.duration,
             transient=self._request.transient_cycles,
             rtol=self._rtol,
-            method=None,
             kinks=self._kinks,
-            threads=None,
-            lanes=True,
             progress=tell,
         )
         if result.interrupted:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.manifest import Manifest, ParameterInfo
 from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 
 #: Name of a bound, its words in messages, and the comparison that a value must satisfy.
@@ -24,26 +24,13 @@ _BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (
 )
 
 
-class Bounded(Protocol):
-    """A number with bounds; None is no bound."""
-
-    @property
-    def above(self) -> float | None: ...
-    @property
-    def least(self) -> float | None: ...
-    @property
-    def most(self) -> float | None: ...
-    @property
-    def below(self) -> float | None: ...
-
-
-def allowed(info: Bounded) -> str:
+def allowed(info: ParameterInfo) -> str:
     """The values a parameter may have, in words; empty where it may have any."""
     bounds = ((word, getattr(info, name)) for name, word, _ in _BOUNDS)
     return " ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
 
 
-def outside(info: Bounded, values: Any) -> Any:
+def outside(info: ParameterInfo, values: Any) -> Any:
     """Whether a number violates the bounds, or each of an array; NaN violates any."""
     within: Any = True if isinstance(values, float) else np.ones(np.shape(values), dtype=bool)
     for name, _, fulfils in _BOUNDS:

@@ -227,16 +227,13 @@ Check = Annotated[
 
 # -------------------------------------------------------------------------------------------------------- what to keep
 
-SampleRate = Annotated[
-    float | None,
-    Option(
-        words="Samples a second instead of the scene's samples in a turn.",
-        example='"25.6 kHz"',
-        shown="RATE",
-        unit="Hz",
-        above=0.0,
-    ),
-]
+
+def rate_of_samples(words: str, example: str = '"25.6 kHz"') -> Option:
+    """Option of samples a second."""
+    return Option(words=words, example=example, shown="RATE", unit="Hz", above=0.0)
+
+
+SampleRate = Annotated[float | None, rate_of_samples("Samples a second instead of the scene's samples in a turn.")]
 
 # ------------------------------------------------------------------------------------------------- files of recordings
 
@@ -251,13 +248,7 @@ TimeColumn = Annotated[
 
 RecordedRate = Annotated[
     float | None,
-    Option(
-        words="Samples a second of the recording, in place of a column of times.",
-        example='"20 kHz"',
-        shown="RATE",
-        unit="Hz",
-        above=0.0,
-    ),
+    rate_of_samples("Samples a second of the recording, in place of a column of times.", '"20 kHz"'),
 ]
 
 # ------------------------------------------------------------------------------------------------------- which instant

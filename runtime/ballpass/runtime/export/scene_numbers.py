@@ -34,17 +34,6 @@ _VARYING = re.compile(
     r"|shaft\.speed"
 )
 
-_KINDS = {
-    "phase": "SCHEDULE_PHASE",
-    "angle": "SCHEDULE_ANGLE",
-    "rate": "SCHEDULE_RATE",
-    "slope": "SCHEDULE_SLOPE",
-    "gate": "SCHEDULE_GATE",
-    "table": "SCHEDULE_TABLE",
-    "table_rate": "SCHEDULE_TABLE_RATE",
-    "border": "SCHEDULE_BORDER",
-}
-
 
 def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
     """Of the dyads of the linkage; none where there is no linkage, or its driver's speed changes."""
@@ -185,7 +174,7 @@ def _inputs(manifest: Manifest, place: dict[str, int]) -> tuple[list[str], str]:
         times = _array(arrays, f"times_{k}", item.times, place)
         heights = _array(arrays, f"heights_{k}", item.values, place)
         entries.append(
-            f"    {{{_KINDS[item.kind]}, {turnings.get(item.turning, -1)}, {item.turns}, {item.parts}, "
+            f"    {{SCHEDULE_{item.kind.upper()}, {turnings.get(item.turning, -1)}, {item.turns}, {item.parts}, "
             f"{len(item.windows)}, {edges}, {len(item.times)}, {times}, {heights}}}, /* {item.name} */"
         )
     # C has no arrays of length zero

@@ -120,7 +120,7 @@ def _simulate_part(
 ) -> tuple[int, Any]:
     """On a worker: where the part begins, and its observables, failures and statistics, or why all were refused."""
     try:
-        result = simulate_many(loaded(key), part, names, threads=1, progress=None, **options)
+        result = simulate_many(loaded(key), part, names, threads=1, **options)
     except RequestError as fault:
         return first, fault
     return first, (dict(result.observables), result.failures, result.statistics)

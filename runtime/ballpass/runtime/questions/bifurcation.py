@@ -38,11 +38,10 @@ PATIENCE = 0.2
 
 Vary = Annotated[
     str,
-    Option(
-        words="Parameter and its values; `:log` behind them for equal factors.",
-        shown="PATH=A:B:N",
-        example='bearing.clearance="5 um:40 um:80"',
-        names=option_names.ranges(counted=True),
+    option_names.ranged(
+        "Parameter and its values; `:log` behind them for equal factors.",
+        'bearing.clearance="5 um:40 um:80"',
+        counted=True,
     ),
 ]
 State = Annotated[

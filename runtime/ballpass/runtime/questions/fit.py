@@ -45,11 +45,9 @@ Data = Annotated[
 ]
 Vary = Annotated[
     str | Sequence[str],
-    Option(
-        words="Parameter to find and its bounds; `:log` behind them for equal factors. May be repeated.",
-        shown="PATH=A:B",
-        example='bearing.clearance="5 um:30 um"',
-        names=option_names.ranges(),
+    option_names.ranged(
+        "Parameter to find and its bounds; `:log` behind them for equal factors. May be repeated.",
+        'bearing.clearance="5 um:30 um"',
     ),
 ]
 SignalColumns = Annotated[

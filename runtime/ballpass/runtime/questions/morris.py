@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.shares.elementary_effects import ElementaryEffect
 
-Of = Annotated[
-    str | Sequence[str],
-    Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q", names=option_names.quantities),
-]
+Of = Annotated[str | Sequence[str], option_names.quantity("Quantity, as `peak_ball_force`. May be repeated.")]
 Base = Annotated[
     int, Option(words="Base members N; there are N (inputs + 1) members.", shown="N", least=4, most=100_000)
 ]

@@ -62,11 +62,9 @@ Goal = Annotated[
 ]
 Vary = Annotated[
     str | Sequence[str],
-    Option(
-        words="Parameter and its bounds; `:log` behind them for equal factors. May be repeated.",
-        shown="PATH=A:B",
-        example='bearing.clearance="0 um:40 um"',
-        names=option_names.ranges(),
+    option_names.ranged(
+        "Parameter and its bounds; `:log` behind them for equal factors. May be repeated.",
+        'bearing.clearance="0 um:40 um"',
     ),
 ]
 Limits = Annotated[
@@ -80,12 +78,11 @@ Limits = Annotated[
 ]
 Tolerance = Annotated[
     str | Sequence[str] | None,
-    Option(
-        words="Deviations of a parameter from its value: goal and limits are then the worst within all of them. May be "
+    option_names.ranged(
+        "Deviations of a parameter from its value: goal and limits are then the worst within all of them. May be "
         "repeated.",
-        shown="PATH=A:B",
-        example='bearing.clearance="-2 um:2 um"',
-        names=option_names.ranges(deviations=True),
+        'bearing.clearance="-2 um:2 um"',
+        deviations=True,
     ),
 ]
 Search = Annotated[

@@ -12,6 +12,7 @@ from typing import Any
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.options import Option
 from ballpass.runtime.contract.parameters import unknown_name
 
 Reader = Callable[[Manifest | None, str, Sequence[str]], None]
@@ -50,7 +51,18 @@ def parameters(manifest: Manifest | None, _option: str, texts: Sequence[str]) ->
         parameters_named(texts, [info.name for info in manifest.parameters])
 
 
-def ranges(*, counted: bool = False, deviations: bool = False) -> Reader:
+def quantity(words: str) -> Option:
+    """Option of quantities."""
+    return Option(words=words, shown="Q", names=quantities)
+
+
+def ranged(words: str, example: str, *, counted: bool = False, deviations: bool = False) -> Option:
+    """Option of parameters with bounds."""
+    shown = "PATH=A:B:N" if counted else "PATH=A:B"
+    return Option(words=words, shown=shown, example=example, names=_ranges(counted=counted, deviations=deviations))
+
+
+def _ranges(*, counted: bool, deviations: bool) -> Reader:
     """Reader of parameters with bounds: ``bearing.clearance=5 um:40 um``; options as for `parameter_range`."""
 
     def read(manifest: Manifest | None, option: str, texts: Sequence[str]) -> None:

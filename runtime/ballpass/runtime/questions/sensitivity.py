@@ -27,11 +27,9 @@ if TYPE_CHECKING:
 
 Of = Annotated[
     str | Sequence[str] | None,
-    Option(
-        words="Quantity: `max:ball.force` (or `peak_ball_force`), `rms:inner.y`, `value:inner.y@240deg`, `drive_work` "
-        "… May be repeated. Peak ball force and motion of the rings if none is given.",
-        shown="Q",
-        names=option_names.quantities,
+    option_names.quantity(
+        "Quantity: `max:ball.force` (or `peak_ball_force`), `rms:inner.y`, `value:inner.y@240deg`, `drive_work` "
+        "… May be repeated. Peak ball force and motion of the rings if none is given."
     ),
 ]
 Wrt = Annotated[

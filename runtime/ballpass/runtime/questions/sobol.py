@@ -36,10 +36,7 @@ UNKNOWN = 0.6
 #: Quantiles in the report.
 QUANTILES = (0.05, 0.5, 0.95)
 
-Of = Annotated[
-    str | Sequence[str] | None,
-    Option(words="Quantity, as `peak_ball_force`. May be repeated.", shown="Q", names=option_names.quantities),
-]
+Of = Annotated[str | Sequence[str] | None, option_names.quantity("Quantity, as `peak_ball_force`. May be repeated.")]
 Spread = Annotated[
     str | Sequence[str],
     Option(

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Duration, Option, RecordedRate, Rtol, TimeColumn, Transient
+from ballpass.runtime.contract.options import (
+    Cycles,
+    Duration,
+    Option,
+    RecordedRate,
+    Rtol,
+    TimeColumn,
+    Transient,
+    rate_of_samples,
+)
 from ballpass.runtime.contract.units import printed_unit, show, table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
@@ -58,13 +67,7 @@ MEANINGS = {
 
 SampleRate = Annotated[
     float | None,
-    Option(
-        words="Lines up to half of this; the run is sampled as finely as the scene says at least.",
-        example='"25.6 kHz"',
-        shown="RATE",
-        unit="Hz",
-        above=0.0,
-    ),
+    rate_of_samples("Lines up to half of this; the run is sampled as finely as the scene says at least."),
 ]
 Of = Annotated[
     str | None,

@@ -72,11 +72,9 @@ Before = Annotated[
 ]
 Over = Annotated[
     str | None,
-    Option(
-        words="Follow the state over a parameter, from the first end of the range to the second.",
-        shown="PATH=A:B",
-        example='bearing.clearance="5 um:15 um"',
-        names=option_names.ranges(),
+    option_names.ranged(
+        "Follow the state over a parameter, from the first end of the range to the second.",
+        'bearing.clearance="5 um:15 um"',
     ),
 ]
 

@@ -184,13 +184,7 @@ def run_members(
             table | dict(zip(inputs, some.T, strict=True)),
             names,
             cycles=cycles,
-            duration=None,
             transient=transient,
-            rtol=None,
-            method=None,
-            kinks=None,
-            threads=None,
-            lanes=True,
             progress=None if progress is None else lambda done: progress((first + done * len(some)) / len(members)),
         )
         if found.interrupted:

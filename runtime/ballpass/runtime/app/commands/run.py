@@ -50,10 +50,8 @@ if TYPE_CHECKING:
 
 Of = Annotated[
     Sequence[str] | None,
-    Option(
-        words="Quantity to report, and to which `--error` applies: `peak_ball_force`, `drive_work`. May be repeated.",
-        shown="Q",
-        names=option_names.quantities,
+    option_names.quantity(
+        "Quantity to report, and to which `--error` applies: `peak_ball_force`, `drive_work`. May be repeated."
     ),
 ]
 

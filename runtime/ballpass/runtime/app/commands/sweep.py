@@ -47,11 +47,9 @@ if TYPE_CHECKING:
 
 Of = Annotated[
     Sequence[str] | None,
-    Option(
-        words="Quantity: `peak_ball_force` (or `max:ball.force`), `rms:inner.y`, `range:inner.x`, `mean:`, `min:` … "
-        "May be repeated. Peak ball force and motion of the inner ring if none is given.",
-        shown="Q",
-        names=option_names.quantities,
+    option_names.quantity(
+        "Quantity: `peak_ball_force` (or `max:ball.force`), `rms:inner.y`, `range:inner.x`, `mean:`, `min:` … "
+        "May be repeated. Peak ball force and motion of the inner ring if none is given."
     ),
 ]
 

@@ -23,11 +23,9 @@ if TYPE_CHECKING:
 
 Of = Annotated[
     Sequence[str] | None,
-    Option(
-        words="Quantity whose error counts, as for a sweep: `peak_ball_force`, `rms:inner.y`, `range:inner.x`. May be "
-        "repeated. Peak ball force, rms and range of the inner ring's motion if none is given.",
-        shown="Q",
-        names=option_names.quantities,
+    option_names.quantity(
+        "Quantity whose error counts, as for a sweep: `peak_ball_force`, `rms:inner.y`, `range:inner.x`. May be "
+        "repeated. Peak ball force, rms and range of the inner ring's motion if none is given."
     ),
 ]
 Against = Annotated[
