@@ -24,8 +24,6 @@ from ballpass.runtime.contract.units import unit_size
 from ballpass.runtime.plot.gallery import FIGURES
 from ballpass.runtime.plot.record import gather
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.questions import QUESTIONS as REGISTERED
-from ballpass.runtime.questions.question import declared
 from ballpass.runtime.report.report import Report, ReportTable
 
 # scenes: damped and preloaded, so that no motion is chaotic.  The cage makes 0.375 * 0.8 turns of the shaft, and its
@@ -628,14 +626,13 @@ QUESTIONS: Mapping[str, Callable[[Asked], Any]] = {
     ),
     "steady": lambda a: a.model.steady(parameters=a.numbers),
 }
-_BY_NAME = {declared(question).name: question for question in REGISTERED}
 
 
 def ask(asked: Asked, question: str) -> Any:
     """What a machine answers."""
     if question in OTHERS:
         return refusable(lambda: OTHERS[question](asked))
-    return refusable(lambda: plain(declared(_BY_NAME[question]).report(QUESTIONS[question](asked))))
+    return refusable(lambda: plain(QUESTIONS[question](asked).report()))
 
 
 def asked(twin: Twin, machine: Machine, model: Model) -> Asked:

@@ -418,9 +418,7 @@ _TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
 def _tangent(kernel: Kernel, name: str, along: tuple[str, ...], results: tuple[str, ...]) -> Kernel:
     """Derivative of a kernel's results along a direction of some of its arguments, named ``x_d`` for ``x``."""
     function = kernel.function
-    symbols = {
-        function.name_in(k): ca.SX.sym(function.name_in(k), function.size1_in(k)) for k in range(function.n_in())
-    }
+    symbols = dict(zip(function.name_in(), function.sx_in(), strict=True))
     values = dict(zip(function.name_out(), function.call([*symbols.values()], True, False), strict=True))
     directions = {f"{k}_d": ca.SX.sym(f"{k}_d", symbols[k].numel()) for k in along}
     point, direction = ca.vertcat(*(symbols[k] for k in along)), ca.vertcat(*directions.values())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ballpass.derive.scene.bearing_records import CageMotion
 from ballpass.derive.scene.keys import ColumnKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, number, quantity, read_keys, read_record
+from ballpass.derive.scene.read_keys import keys_of, number, quantity, read_keys, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
@@ -45,7 +45,7 @@ class Jitter:
     deviation: float = quantity("1", "Standard deviation of the slip", example=0.01, setting=True)
     interval: float = quantity("s", "Interval of the jitter", example="5 ms", setting=True)
     duration: float = quantity("s", "Duration of the jitter", example="1 s", setting=True, note="at most 500 intervals")
-    seed: int = declared(WholeKey(words="Seed", lowest=0, highest=2**63 - 1, example=1))
+    seed: int = WholeKey(words="Seed", lowest=0, highest=2**63 - 1, example=1).declared()
 
 
 def read_cage(table: Table) -> CageMotion | None:

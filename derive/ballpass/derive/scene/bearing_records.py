@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
-from ballpass.derive.scene.read_keys import Either, declared, not_negative, positive, quantity
+from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
 from ballpass.runtime.ratings.life import CONTAMINATION
 from ballpass.runtime.ratings.lubrication import FILTERS, GRADES
 
@@ -169,9 +169,9 @@ class EquivalentMass:
 
     ring: SceneNumber = positive("kg", "Mass of the inner ring", "m_i", "0.032 kg")
     crankpin: SceneNumber = not_negative("kg", "Mass of the crankpin", "m_x", "0.05 kg")
-    crank: Literal["whole", "half"] = declared(
-        ChoiceKey(words="How much of the crank counts", choices=("whole", "half"))
-    )
+    crank: Literal["whole", "half"] = ChoiceKey(
+        words="How much of the crank counts", choices=("whole", "half")
+    ).declared()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -276,9 +276,9 @@ class Lubrication:
         remedy="give that of the oil at the bearing's temperature",
         note="κ follows at each speed",
     )
-    oil_grade: str | None = declared(
-        ChoiceKey(words="Viscosity grade of the oil, ISO 3448", choices=GRADES, note="mineral oil, viscosity index 95")
-    )
+    oil_grade: str | None = ChoiceKey(
+        words="Viscosity grade of the oil, ISO 3448", choices=GRADES, note="mineral oil, viscosity index 95"
+    ).declared()
     temperature_celsius: float | None = quantity(
         "1",
         "Temperature of the bearing in degrees Celsius",
@@ -297,35 +297,29 @@ class Lubrication:
         remedy="write contamination = 0.5 where cleanliness is normal",
         note="1 is clean; classes in {doc}`../theory/life`",
     )
-    cleanliness: str | None = declared(
-        ChoiceKey(
-            words="Class of cleanliness of ISO 281",
-            choices=tuple(CONTAMINATION),
-            note="$e_C$ is the lower end of its range",
-        )
-    )
-    oil_code: str | None = declared(
-        ChoiceKey(
-            words="Cleanliness code of a circulating oil or a bath, ISO 4406",
-            choices=tuple(FILTERS["off line"]),
-            note="$e_C$ follows with `filter`, κ and pitch diameter",
-        )
-    )
-    filter: str | None = declared(
-        ChoiceKey(
-            words="Where the oil is filtered",
-            choices=tuple(FILTERS),
-            optional=True,
-            needs=(
-                Needs(
-                    key="oil_code",
-                    why="a filter belongs to the code of an oil",
-                    remedy="delete the key, or give oil_code instead of the contamination",
-                ),
+    cleanliness: str | None = ChoiceKey(
+        words="Class of cleanliness of ISO 281",
+        choices=tuple(CONTAMINATION),
+        note="$e_C$ is the lower end of its range",
+    ).declared()
+    oil_code: str | None = ChoiceKey(
+        words="Cleanliness code of a circulating oil or a bath, ISO 4406",
+        choices=tuple(FILTERS["off line"]),
+        note="$e_C$ follows with `filter`, κ and pitch diameter",
+    ).declared()
+    filter: str | None = ChoiceKey(
+        words="Where the oil is filtered",
+        choices=tuple(FILTERS),
+        optional=True,
+        needs=(
+            Needs(
+                key="oil_code",
+                why="a filter belongs to the code of an oil",
+                remedy="delete the key, or give oil_code instead of the contamination",
             ),
-            note='default `"off line"`, also for a bath',
-        )
-    )
+        ),
+        note='default `"off line"`, also for a bath',
+    ).declared()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -383,21 +377,19 @@ class Bearing:
     )
 
     name: str
-    joint: str | None = declared(
-        TextKey(
-            words="The joint that the bearing is at",
-            example="A",
-            needs=(
-                Needs(
-                    key="mechanism",
-                    why="there is no mechanism to load the bearing",
-                    words="[mechanism]",
-                    remedy="delete the key, or describe the mechanism",
-                ),
+    joint: str | None = TextKey(
+        words="The joint that the bearing is at",
+        example="A",
+        needs=(
+            Needs(
+                key="mechanism",
+                why="there is no mechanism to load the bearing",
+                words="[mechanism]",
+                remedy="delete the key, or describe the mechanism",
             ),
-            note="one-way: the driver's joint; two-way: any revolute joint",
-        )
-    )
+        ),
+        note="one-way: the driver's joint; two-way: any revolute joint",
+    ).declared()
     share: SceneNumber | None = quantity(
         "1",
         "Share of the joint's reaction that the bearing carries",
@@ -415,15 +407,13 @@ class Bearing:
         bounds=Bounds(least=0.0, most=1.0),
         remedy="give the part of the load that this bearing carries: 0.5 for one of a pair",
     )
-    coupling: Literal["one-way", "two-way"] = declared(
-        ChoiceKey(
-            words="How bearing and linkage move each other",
-            choices=("one-way", "two-way"),
-            default="one-way",
-            note="one-way: the reaction of an ideal linkage loads the bearing; two-way: its clearance and its forces "
-            "act on both bodies, see {doc}`../theory/coupling`. The same for all bearings of a scene",
-        )
-    )
+    coupling: Literal["one-way", "two-way"] = ChoiceKey(
+        words="How bearing and linkage move each other",
+        choices=("one-way", "two-way"),
+        default="one-way",
+        note="one-way: the reaction of an ideal linkage loads the bearing; two-way: its clearance and its forces "
+        "act on both bodies, see {doc}`../theory/coupling`. The same for all bearings of a scene",
+    ).declared()
     inner_body: str = ""
     beside: str = ""
     count: SceneNumber | None = positive(
@@ -443,16 +433,14 @@ class Bearing:
         ),
         note="a whole number; those that differ have tables of their own",
     )
-    balls: int = declared(
-        WholeKey(
-            words="Number of balls",
-            lowest=FEWEST_BALLS,
-            highest=MOST_BALLS,
-            example=8,
-            when=_BY_DESIGNATION,
-            note="they must fit on the pitch circle",
-        )
-    )
+    balls: int = WholeKey(
+        words="Number of balls",
+        lowest=FEWEST_BALLS,
+        highest=MOST_BALLS,
+        example=8,
+        when=_BY_DESIGNATION,
+        note="they must fit on the pitch circle",
+    ).declared()
     ball_diameter: SceneNumber = positive("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION)
     pitch_diameter: SceneNumber = positive(
         "m", "Diameter of the circle of ball centres", "D_{pw}", "33.5 mm", when=_BY_DESIGNATION

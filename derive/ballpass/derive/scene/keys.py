@@ -13,7 +13,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from typing import Any, ClassVar, Self
 
@@ -116,6 +116,11 @@ class Key(ABC):
         texts |= {name: tuple(filled(t, fill) for t in v) for name, v in values.items() if _texts(v)}
         texts |= {"needs": tuple(replace(one, key=filled(one.key, fill)) for one in self.needs)} if self.needs else {}
         return replace(self, **texts) if texts else self
+
+    def declared(self) -> Any:
+        """A field of a record that the key fills; None where it may be left out."""
+        metadata = {"key": self}
+        return field(default=None, metadata=metadata) if self.optional else field(metadata=metadata)
 
     @property
     def sample(self) -> str:

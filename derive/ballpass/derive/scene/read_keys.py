@@ -6,7 +6,7 @@ In: a table, and a record whose fields are declared with keys.  Out: the record;
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -67,12 +67,6 @@ class Either:
         return given[0] if given else ()
 
 
-def declared(key: Key) -> Any:
-    """A field of a record that the key fills; None where it may be left out."""
-    metadata = {"key": key}
-    return field(default=None, metadata=metadata) if key.optional else field(metadata=metadata)
-
-
 def number(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> QuantityKey:
     """The key of a number; `more` as in `QuantityKey`."""
     return QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more)
@@ -80,7 +74,7 @@ def number(unit: str, words: str, symbol: str = "", example: Any = "", **more: A
 
 def quantity(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
     """A field that a number fills."""
-    return declared(number(unit, words, symbol, example, **more))
+    return number(unit, words, symbol, example, **more).declared()
 
 
 def positive(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
@@ -95,7 +89,7 @@ def not_negative(unit: str, words: str, symbol: str = "", example: Any = "", **m
 
 def column(unit: str, words: str, symbol: str, **more: Any) -> Any:
     """A field that the column of a table fills."""
-    return declared(ColumnKey(unit=unit, words=words, symbol=symbol, **more))
+    return ColumnKey(unit=unit, words=words, symbol=symbol, **more).declared()
 
 
 def keys_of(kind: type[Any], fill: Fill = _NOTHING) -> dict[str, Key]:

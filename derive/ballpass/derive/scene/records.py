@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
 from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
-from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
+from ballpass.derive.scene.read_keys import Either, column, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.contract.defaults import TOLERANCES
@@ -82,17 +82,15 @@ class Body:
         when="required, except for a slider on a fixed guide, which does not turn",
         remedy="give a positive value, or delete the key for a body that does not rotate",
     )
-    center_of_mass: Vector = declared(
-        VectorKey(
-            unit="m",
-            words="the centre of mass of the NAME",
-            note="vector in body axes",
-            axis="Distance of the centre of mass of the NAME from its origin, along its x axis",
-            symbols=("l_{o,INDEX}", "x_{o,INDEX}", "y_{o,INDEX}", "l_{o,INDEX}", r"\theta_{p,INDEX}"),
-            origin=True,
-            length_limits=AMOUNT,
-        )
-    )
+    center_of_mass: Vector = VectorKey(
+        unit="m",
+        words="the centre of mass of the NAME",
+        note="vector in body axes",
+        axis="Distance of the centre of mass of the NAME from its origin, along its x axis",
+        symbols=("l_{o,INDEX}", "x_{o,INDEX}", "y_{o,INDEX}", "l_{o,INDEX}", r"\theta_{p,INDEX}"),
+        origin=True,
+        length_limits=AMOUNT,
+    ).declared()
     points: tuple[NamedPoint, ...]
 
     def point(self, name: str) -> Vector:
@@ -115,24 +113,20 @@ class Joint:
     """
 
     name: str
-    kind: Literal["revolute", "prismatic"] = declared(
-        ChoiceKey(name="type", words="Kind of joint", choices=("revolute", "prismatic"))
-    )
-    bodies: tuple[str, str] = declared(
-        NamesKey(
-            words="Its two bodies",
-            example='["frame", "crank"]',
-            note='`"frame"` is the body that does not move; the reaction is the force of the second on the first',
-        )
-    )
-    points: tuple[str, str] = declared(
-        NamesKey(
-            words="The point of each body",
-            example='["NAME", "NAME"]',
-            default=("NAME", "NAME"),
-            when="default: the joint's own name, twice",
-        )
-    )
+    kind: Literal["revolute", "prismatic"] = ChoiceKey(
+        name="type", words="Kind of joint", choices=("revolute", "prismatic")
+    ).declared()
+    bodies: tuple[str, str] = NamesKey(
+        words="Its two bodies",
+        example='["frame", "crank"]',
+        note='`"frame"` is the body that does not move; the reaction is the force of the second on the first',
+    ).declared()
+    points: tuple[str, str] = NamesKey(
+        words="The point of each body",
+        example='["NAME", "NAME"]',
+        default=("NAME", "NAME"),
+        when="default: the joint's own name, twice",
+    ).declared()
     direction: SceneNumber | None = quantity(
         "rad",
         "Direction of the guide of joint NAME",
@@ -176,9 +170,9 @@ class Driver:
     [kg*m^2] (None: none) turns with the driven body.
     """
 
-    joint: str = declared(
-        TextKey(words="The joint that turns", example="A", note='revolute, with `bodies = ["frame", <driven body>]`')
-    )
+    joint: str = TextKey(
+        words="The joint that turns", example="A", note='revolute, with `bodies = ["frame", <driven body>]`'
+    ).declared()
     speed: SceneNumber = quantity(
         "rad/s",
         "Speed of the driverSTART",
@@ -255,21 +249,19 @@ class Shaft:
         "1200 rpm",
         note="of the ring that turns, whose angle is zero at t = 0",
     )
-    ring: Literal["inner", "outer"] = declared(
-        ChoiceKey(
-            words="The ring that turns with the shaft",
-            choices=("inner", "outer"),
-            default="inner",
-            note="loads act on the inner ring, also where it stands",
-        )
-    )
+    ring: Literal["inner", "outer"] = ChoiceKey(
+        words="The ring that turns with the shaft",
+        choices=("inner", "outer"),
+        default="inner",
+        note="loads act on the inner ring, also where it stands",
+    ).declared()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantLoad:
     """Constant force on the inner ring [N]."""
 
-    force: Vector = declared(force_key("the load on the inner ring", "F"))
+    force: Vector = force_key("the load on the inner ring", "F").declared()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,8 +271,8 @@ class HarmonicLoad:
     `phase` is one for both components, or that of x and that of y.
     """
 
-    mean: Vector = declared(force_key("the mean load on the inner ring", r"\bar F"))
-    amplitude: Vector = declared(force_key("the amplitude of the load on the inner ring", r"\hat F"))
+    mean: Vector = force_key("the mean load on the inner ring", r"\bar F").declared()
+    amplitude: Vector = force_key("the amplitude of the load on the inner ring", r"\hat F").declared()
     frequency: SceneNumber = positive("Hz", "Frequency of the load", "f", "50 Hz")
     phase: SceneNumber | tuple[SceneNumber, SceneNumber] = quantity(
         "rad",
@@ -408,24 +400,20 @@ class RunSettings:
         remedy="write 0 to keep the whole run",
         note="fewer than `cycles`",
     )
-    samples_per_cycle: int = declared(
-        WholeKey(
-            words="Samples in a turn",
-            lowest=16,
-            highest=1_000_000,
-            example=2000,
-            default=2000,
-            note="in the whole run where nothing turns",
-        )
-    )
-    method: str = declared(
-        ChoiceKey(
-            words="Integrator",
-            choices=("auto", *STEPPERS, "cvodes"),
-            default="auto",
-            note="see {doc}`../theory/integration`",
-        )
-    )
+    samples_per_cycle: int = WholeKey(
+        words="Samples in a turn",
+        lowest=16,
+        highest=1_000_000,
+        example=2000,
+        default=2000,
+        note="in the whole run where nothing turns",
+    ).declared()
+    method: str = ChoiceKey(
+        words="Integrator",
+        choices=("auto", *STEPPERS, "cvodes"),
+        default="auto",
+        note="see {doc}`../theory/integration`",
+    ).declared()
     rtol: float = quantity(
         "1",
         "Relative tolerance",
@@ -494,15 +482,13 @@ class Scene:
     """
 
     name: str
-    title: str = declared(
-        TextKey(
-            words="What the scene is, in one line",
-            example="Punching machine",
-            default="",
-            when="default: the scene's name",
-            longest=200,
-        )
-    )
+    title: str = TextKey(
+        words="What the scene is, in one line",
+        example="Punching machine",
+        default="",
+        when="default: the scene's name",
+        longest=200,
+    ).declared()
     mechanism: Mechanism | None
     shaft: Shaft | None
     loads: tuple[Load, ...]

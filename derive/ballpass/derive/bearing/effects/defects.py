@@ -28,7 +28,7 @@ from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearin
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import ChoiceKey, WholeKey
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
+from ballpass.derive.scene.read_keys import keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input, gate_of
@@ -47,9 +47,9 @@ class Spall:
     """A spall of a raceway or of a ball."""
 
     name: str
-    on: str = declared(ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball"))
-    ball: int = declared(BALL)
-    profile: str = declared(ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES))
+    on: str = ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball").declared()
+    ball: int = BALL.declared()
+    profile: str = ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES).declared()
     angle: SceneNumber = quantity(
         "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ballpass.derive.scene.keys import Key, WholeKey
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, quantity, read_record
+from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
@@ -45,9 +45,9 @@ class Roughness:
 
     amplitude: float = quantity("m", "Amplitude of the lowest order", example="0.1 um", setting=True)
     exponent: float = quantity("1", "$p$ of $B_n = B_{n_0} (n_0/n)^p$", example=1.0, setting=True)
-    lowest: int = declared(WholeKey(words="Lowest order", lowest=1, highest=MOST_WAVES, example=2))
-    highest: int = declared(WholeKey(words="Highest order", lowest=1, highest=MOST_WAVES, example=40))
-    seed: int = declared(WholeKey(words="Seed of the random phases", lowest=0, highest=2**63 - 1, example=1))
+    lowest: int = WholeKey(words="Lowest order", lowest=1, highest=MOST_WAVES, example=2).declared()
+    highest: int = WholeKey(words="Highest order", lowest=1, highest=MOST_WAVES, example=40).declared()
+    seed: int = WholeKey(words="Seed of the random phases", lowest=0, highest=2**63 - 1, example=1).declared()
 
 
 def wave_tables(where: str, *around: str) -> dict[tuple[str, ...], dict[str, Key]]:

@@ -12,7 +12,7 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import declared, quantity
+from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
@@ -30,8 +30,8 @@ class AlongDirection(Pathway):
         size="distance", size_unit="m", example="2 mm", amount="tension", amount_unit="N"
     )
 
-    bodies: tuple[str, str] = declared(BODIES)
-    points: tuple[str, str] = declared(POINTS)
+    bodies: tuple[str, str] = BODIES.declared()
+    points: tuple[str, str] = POINTS.declared()
     direction: SceneNumber = quantity(
         "rad", "Direction of NAME in the axes of its first body", r"\alpha_{INDEX}", "90 deg"
     )

@@ -11,7 +11,7 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill, WholeKey
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import column, declared, read_record
+from ballpass.derive.scene.read_keys import column, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 
@@ -31,16 +31,14 @@ class AngleTable(Law):
     values: tuple[SceneNumber, ...] = column(
         "COLUMN_UNIT", "THE_COLUMN in row ROW of the table of NAME", "T_{INDEX,ROW}", name="COLUMN"
     )
-    turns: int = declared(
-        WholeKey(
-            words="Turns of the driver after which the table of NAME repeats",
-            lowest=1,
-            highest=MOST_TURNS,
-            default=1,
-            example=2,
-            note="2 for a four-stroke engine: angles up to 720 deg",
-        )
-    )
+    turns: int = WholeKey(
+        words="Turns of the driver after which the table of NAME repeats",
+        lowest=1,
+        highest=MOST_TURNS,
+        default=1,
+        example=2,
+        note="2 for a four-stroke engine: angles up to 720 deg",
+    ).declared()
 
     @classmethod
     def inner(cls) -> type[Any]:

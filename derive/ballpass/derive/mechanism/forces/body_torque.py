@@ -9,7 +9,7 @@ from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import declared, quantity
+from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import symbol_of
 
@@ -21,7 +21,7 @@ class BodyTorque(Pathway):
     column: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N*m"
 
-    body: str = declared(BODY)
+    body: str = BODY.declared()
     torque: SceneNumber | None = quantity(
         "N*m", "Torque NAME on the BODY, counter-clockwise", "M_{INDEX}", "20 N*m", when="required without `table`"
     )

@@ -11,7 +11,6 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.keys import TextKey
-from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Joint
 
 
@@ -22,13 +21,11 @@ class JointMotion(Pathway):
     kind: ClassVar[Literal["revolute", "prismatic"]]
     other: ClassVar[str]
 
-    joint: str = declared(
-        TextKey(
-            words="The joint",
-            example="B",
-            note="revolute (friction) or prismatic (guide friction), with or without a bearing",
-        )
-    )
+    joint: str = TextKey(
+        words="The joint",
+        example="B",
+        note="revolute (friction) or prismatic (guide friction), with or without a bearing",
+    ).declared()
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Rate of the joint, and the loads on its bodies by an amount."""

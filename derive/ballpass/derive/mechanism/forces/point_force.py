@@ -13,7 +13,7 @@ from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.read_keys import declared, quantity
+from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.scene.records import AMOUNT, Force, force_key
 from ballpass.derive.terms import components, symbol_of
 
@@ -22,11 +22,11 @@ from ballpass.derive.terms import components, symbol_of
 class PointForce(Pathway):
     """`force` [N] on a named point; where the law gives the amount, its `direction` [rad] alone."""
 
-    body: str = declared(BODY)
-    point: str = declared(TextKey(words="The point of it where the force acts", example="C"))
-    force: Vector = declared(
-        force_key("the force NAME on the BODY", "F", "INDEX", when="required without `table`", length_limits=AMOUNT)
-    )
+    body: str = BODY.declared()
+    point: str = TextKey(words="The point of it where the force acts", example="C").declared()
+    force: Vector = force_key(
+        "the force NAME on the BODY", "F", "INDEX", when="required without `table`", length_limits=AMOUNT
+    ).declared()
     direction: SceneNumber | None = quantity(
         "rad",
         "Direction of the force NAME on the BODY",

@@ -13,7 +13,6 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import cross, dot, subscript
 from ballpass.derive.mechanism.swing import Mean, Turns
 from ballpass.derive.scene.body_keys import BODIES
-from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.terms import Definition
 from ballpass.runtime.contract.manifest import UsualInfo
@@ -32,7 +31,7 @@ class TwoBodies(Pathway):
         size="angle", size_unit="rad", example="90 deg", amount="torque", amount_unit="N*m"
     )
 
-    bodies: tuple[str, str] = declared(BODIES)
+    bodies: tuple[str, str] = BODIES.declared()
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Relative angle and its rate."""

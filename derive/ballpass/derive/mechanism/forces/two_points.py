@@ -12,7 +12,6 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
 from ballpass.derive.variables import Output
 
@@ -25,8 +24,8 @@ class TwoPoints(Pathway):
         size="length", size_unit="m", example="40 mm", amount="tension", amount_unit="N"
     )
 
-    bodies: tuple[str, str] = declared(BODIES)
-    points: tuple[str, str] = declared(POINTS)
+    bodies: tuple[str, str] = BODIES.declared()
+    points: tuple[str, str] = POINTS.declared()
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Length, its rate and the direction of the line."""
