@@ -79,7 +79,39 @@ class StabilityLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExplicitTableau:
+class Tableau:
+    """What methods have in common.
+
+    Attributes
+    ----------
+    name : name of the method
+    number : of the method in C, from 1 on; never changed, for exported programs take it
+    order, dense_order : of solution and dense output
+    nodes : c_i, shape (s,)
+    matrix : a_ij, s rows, row i with i figures (0-based)
+    weights : of the stages in the solution, shape (s,)
+    dense_rows : of the stages in the dense output
+    source : where the figures are printed
+    """
+
+    name: str
+    number: int
+    order: int
+    dense_order: int
+    nodes: Row
+    matrix: Rows
+    weights: Row
+    dense_rows: Rows
+    source: str
+
+    @property
+    def stages(self) -> int:
+        """Slopes, or linear systems, of a step; the first slope of an explicit method is known from the step before."""
+        return len(self.nodes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplicitTableau(Tableau):
     """An explicit Runge–Kutta pair with dense output.
 
     ``k_i = f(t + c_i h, y0 + h sum_j a_ij k_j)`` for s stages, ``y1 = y0 + h sum_i b_i k_i``.  Stage s + 1 is the end
@@ -98,17 +130,11 @@ class ExplicitTableau:
 
     Attributes
     ----------
-    name : name of the method
-    number : of the method in C, from 1 on; never changed, for exported programs take it
-    order, dense_order : of solution and dense output
-    nodes : c_i, shape (s,)
-    matrix : a_ij, s rows, row i with i figures (0-based)
-    weights : b_i, shape (s,)
+    weights : b_i
     error_estimates : at least one; the first has share 1
     dense_nodes : c_i of the stages of the dense output, shape (r,)
     dense_matrix : a_ij of these, r rows, row i with s + 1 + i figures
     dense_rows : d_mi of ``F_(m + 3) = h sum_i d_mi k_i``, each of shape (s + 1 + r,)
-    source : where the figures are printed
     stability : limits for a method that ``auto`` takes
 
     Raises
@@ -116,18 +142,9 @@ class ExplicitTableau:
     TableauError : a row has too many or too few figures
     """
 
-    name: str
-    number: int
-    order: int
-    dense_order: int
-    nodes: Row
-    matrix: Rows
-    weights: Row
     error_estimates: tuple[ErrorEstimate, ...]
     dense_nodes: Row
     dense_matrix: Rows
-    dense_rows: Rows
-    source: str
     stability: StabilityLimits | None = None
 
     def __post_init__(self) -> None:
@@ -143,11 +160,6 @@ class ExplicitTableau:
         )
 
     @property
-    def stages(self) -> int:
-        """Slopes that form the new solution; the first of them is known from the step before."""
-        return len(self.nodes)
-
-    @property
     def error_exponent(self) -> int:
         """q in error ∝ h**q, for the step size controller."""
         lowest = min(estimate.order for estimate in self.error_estimates)
@@ -155,7 +167,7 @@ class ExplicitTableau:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RosenbrockTableau:
+class RosenbrockTableau(Tableau):
     """A linearly implicit pair with dense output, in the form that needs no product with the Jacobian.
 
     With ``u_i = h sum_j gamma_ij k_j``, stage i solves
@@ -173,39 +185,25 @@ class RosenbrockTableau:
 
     Attributes
     ----------
-    name : name of the method
-    number : of the method in C, from 1 on; never changed, for exported programs take it
-    order, embedded_order, dense_order : of solution, embedded solution and dense output
+    embedded_order : of the embedded solution
     gamma : the diagonal of gamma_ij
-    nodes : c_i, shape (s,)
-    matrix : a_ij, s rows, row i with i figures (0-based)
     coupling : C_ij, s rows, row i with i figures
     time_weights : d_i, the row sums of gamma_ij, shape (s,)
-    weights : m_i, shape (s,)
+    weights : m_i
     error_weights : e_i, shape (s,)
     dense_rows : h_mi of H1, H2, ..., each of shape (s,).  The figures of the last stage are free as far as the order
         goes: its u is the error estimate, no larger than what the dense output leaves out
-    source : where the figures are printed
 
     Raises
     ------
     TableauError : a row has too many or too few figures
     """
 
-    name: str
-    number: int
-    order: int
     embedded_order: int
-    dense_order: int
     gamma: Fraction
-    nodes: Row
-    matrix: Rows
     coupling: Rows
     time_weights: Row
-    weights: Row
     error_weights: Row
-    dense_rows: Rows
-    source: str
 
     def __post_init__(self) -> None:
         size = self.stages
@@ -222,14 +220,6 @@ class RosenbrockTableau:
         )
 
     @property
-    def stages(self) -> int:
-        """Number of stages: linear systems solved in a step, all with one matrix."""
-        return len(self.nodes)
-
-    @property
     def error_exponent(self) -> int:
         """q in error ∝ h**q, for the step size controller."""
         return self.embedded_order + 1
-
-
-Tableau: TypeAlias = ExplicitTableau | RosenbrockTableau

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
-from ballpass.runtime.export.scene_numbers import computed_outputs, outputs_function
+from ballpass.runtime.export.scene_numbers import computed_outputs, moment_symbols, outputs_function
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.time import timeline
 
@@ -34,10 +34,7 @@ class Dependencies:
 
 def rates_and_outputs(model: LoadedModel) -> tuple[dict[str, casadi.SX], casadi.SX]:
     """Symbols t, x, u, p, c; over them the rates and, behind these, numbers of the outputs that are no states."""
-    manifest = model.manifest
-    sizes = {"t": 1, "x": len(manifest.states), "u": len(manifest.inputs)}
-    sizes |= {"p": len(manifest.parameters), "c": len(manifest.constants)}
-    moment = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+    moment = moment_symbols(model.manifest)
     functions = [model.symbolic("rhs"), outputs_function(model)]
     results = [function(*(moment[name] for name in function.name_in())) for function in functions]
     return moment, casadi.vertcat(*(casadi.densify(result) for result in results))

@@ -46,8 +46,10 @@ from ballpass.runtime.export.scene_numbers import (
     speed_table,
     varying,
 )
+from ballpass.runtime.native.compile import library_suffix
 from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
+from ballpass.runtime.native.functions import directional
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.request.magnitudes import model_scales
 from ballpass.runtime.time.timeline import stretch
@@ -102,7 +104,7 @@ def export_fmu(
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
         "documentation/index.html": _page(manifest, chosen).encode(),
         "documentation/licenses/license.txt": (FMI / "license.txt").read_bytes(),
-        f"binaries/{platform_tuple()}/{identifier}{_SUFFIX}": _compiled(sources, identifier),
+        f"binaries/{platform_tuple()}/{identifier}{library_suffix()}": _compiled(sources, identifier),
     }
     target.parent.mkdir(parents=True, exist_ok=True)
     with replaced(target) as made, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -164,9 +166,6 @@ def platform_tuple() -> str:
     return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64', 'i386': 'x86', 'i686': 'x86'}.get(machine, machine) }-{system}"
 
 
-_SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
-
-
 def _interface(model: LoadedModel) -> dict[str, str]:
     """Sources of the interface: those that are the same for all scenes, and derivatives of this one."""
     texts = {path.name: path.read_text(encoding="utf-8") for path in sorted(FMI.glob("*.[ch]"))}
@@ -195,14 +194,10 @@ def _tangents(model: LoadedModel) -> tuple[casadi.Function, casadi.Function]:
     """Directional derivatives of the derived constants over p, and of rates and outputs over t, x, u, p, c."""
     moment, results = rates_and_outputs(model)
     constants = model.symbolic("constants")(moment["p"])
-    return _tangent("constants_tangent", {"p": moment["p"]}, constants), _tangent("tangent", moment, results)
-
-
-def _tangent(name: str, arguments: Mapping[str, casadi.SX], value: casadi.SX) -> casadi.Function:
-    directions = {f"d{name}": casadi.SX.sym(f"d{name}", argument.numel()) for name, argument in arguments.items()}
-    moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
-    both = {**arguments, **directions}
-    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], ["moved"])
+    return (
+        directional("constants_tangent", {"p": moment["p"]}, constants, "moved"),
+        directional("tangent", moment, results, "moved"),
+    )
 
 
 def _token(manifest: Manifest, inputs: Sequence[str], sources: Mapping[str, str]) -> str:
@@ -239,7 +234,7 @@ def _compiled(sources: Mapping[str, str], identifier: str) -> bytes:
         place = Path(folder)
         for name, text in sources.items():
             (place / name).write_text(text, encoding="utf-8", newline="\n")
-        made = f"{identifier}{_SUFFIX}"
+        made = f"{identifier}{library_suffix()}"
         command = (*compiler.command, *LIBRARY_FLAGS, *names, *own, "-o", made, "-lm")
         run_compiler(command, place, " ".join(command))
         return (place / made).read_bytes()

@@ -35,6 +35,12 @@ _VARYING = re.compile(
 )
 
 
+def moment_symbols(manifest: Manifest) -> dict[str, casadi.SX]:
+    """Symbols t, x, u, p, c."""
+    counts = (manifest.states, manifest.inputs, manifest.parameters, manifest.constants)
+    return {name: casadi.SX.sym(name, size) for name, size in zip("txupc", (1, *map(len, counts)), strict=True)}
+
+
 def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
     """Of the dyads of the linkage; none where there is no linkage, or its driver's speed changes."""
     mechanism = manifest.mechanism

@@ -16,7 +16,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.c_program import program_texts
-from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind
+from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind, moment_symbols
 from ballpass.runtime.native.compilers import run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -93,14 +93,7 @@ def drawn_columns(manifest: Manifest) -> tuple[int, int, int, int]:
 def _drawn(model: LoadedModel) -> casadi.Function:
     """What `drawn_columns` counts, one below the other, over t, x, u, p and c."""
     manifest = model.manifest
-    sizes = {
-        "t": 1,
-        "x": len(manifest.states),
-        "u": len(manifest.inputs),
-        "p": len(manifest.parameters),
-        "c": len(manifest.constants),
-    }
-    given = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+    given = moment_symbols(manifest)
     points, cages, *_ = drawn_columns(manifest)
 
     def values(name: str) -> casadi.SX:

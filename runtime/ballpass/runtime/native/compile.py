@@ -161,13 +161,13 @@ def compile_sources(
         made = Path(temporary)
         _write_copies(made, contents)
         copies = tuple(str(made / path.name) for path in sources)
-        library = made / f"library{_suffix()}"
+        library = made / f"library{library_suffix()}"
         library.touch()
         command = (*compiler.command, *compiler.flags, *copies, "-o", str(library), "-lm")
         shown = shlex.join((*compiler.command, *compiler.flags, *map(str, sources), "-o", library.name, "-lm"))
         run_compiler(command, made, shown)
         library.chmod(0o755)
-        target = folder / f"{name}-{_digest(library)}{_suffix()}"
+        target = folder / f"{name}-{_digest(library)}{library_suffix()}"
         try:
             os.replace(library, target)
         except IsADirectoryError:
@@ -209,14 +209,14 @@ def _find(folder: Path, name: str) -> Path | None:
     """The library of this name in the cache, opened; None, with a warning, where it is not what was written."""
     try:
         refuse_shared(folder)
-        found = sorted(folder.glob(f"{name}-*{_suffix()}"))
+        found = sorted(folder.glob(f"{name}-*{library_suffix()}"))
     except OSError:  # `_writable_cache_folder` says why
         found = []
     for path in found:
         if path in _opened:  # its code is in this process, whatever has become of the file
             return path
         try:
-            whole = path.name == f"{name}-{_digest(path)}{_suffix()}"
+            whole = path.name == f"{name}-{_digest(path)}{library_suffix()}"
             if whole:
                 _opened[path] = ctypes.CDLL(str(path))
                 return path
@@ -346,5 +346,6 @@ def _file_name(label: str) -> str:
     return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in label) or "model"
 
 
-def _suffix() -> str:
+def library_suffix() -> str:
+    """Ending of the names of libraries."""
     return {"Darwin": ".dylib", "Windows": ".dll"}.get(platform.system(), ".so")

@@ -228,7 +228,12 @@ def _differentiate(graph: casadi.Function, name: str, along: str | None) -> casa
     if along is not None:
         block = casadi.cse(casadi.jacobian(value, arguments[along]))
         return casadi.Function(name, [*arguments.values()], [block], [*arguments], [f"{result}_{along}"])
+    return directional(name, arguments, value, f"d{result}")
+
+
+def directional(name: str, arguments: Mapping[str, casadi.SX], value: casadi.SX, result: str) -> casadi.Function:
+    """Derivative along a direction of all arguments, ``dx`` for ``x``."""
     directions = {f"d{key}": casadi.SX.sym(f"d{key}", argument.numel()) for key, argument in arguments.items()}
     moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
     both = {**arguments, **directions}
-    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], [f"d{result}"])
+    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], [result])
