@@ -7,7 +7,7 @@ from typing import Literal
 
 import sympy as sp
 
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import Definition, Smoothness
 from ballpass.runtime.contract.manifest import TurningInfo
 
 #: Angle of the body that the drive turns [rad].
@@ -76,6 +76,24 @@ class StateSwitch:
     changes: str
     angle: sp.Expr | None = None
     turning: sp.Expr = sp.S.Zero
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Terms:
+    """What something is made of.
+
+    Attributes
+    ----------
+    constants, inputs, definitions : of its symbols; constants are derived from parameters
+    smoothness : by name, of functions of the state that have jumps or kinks
+    switches : places of the motion where they jump
+    """
+
+    constants: tuple[Definition, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    definitions: tuple[Definition, ...] = ()
+    smoothness: tuple[tuple[str, Smoothness], ...] = ()
+    switches: tuple[StateSwitch, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

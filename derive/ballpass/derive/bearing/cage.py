@@ -18,12 +18,12 @@ from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
-from ballpass.derive.variables import Coordinate, Input, StateSwitch, turned
+from ballpass.derive.variables import Coordinate, Input, Terms, turned
 from ballpass.runtime.contract.manifest import TurningInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cage:
+class Cage(Terms):
     """How the balls turn.
 
     Attributes
@@ -46,13 +46,9 @@ class Cage:
     rate: sp.Symbol
     in_outer: sp.Expr
     in_inner: sp.Expr
-    inputs: tuple[Input, ...]
-    constants: tuple[Definition, ...]
     share: sp.Expr
-    definitions: tuple[Definition, ...] = ()
     spin: sp.Expr | None = None
     ring_rate: sp.Symbol | None = None
-    switches: tuple[StateSwitch, ...] = ()
     lag: tuple[Coordinate, sp.Expr] | None = None
 
 

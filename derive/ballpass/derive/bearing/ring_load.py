@@ -28,7 +28,7 @@ from ballpass.derive.scene.records import (
     UnbalanceLoad,
 )
 from ballpass.derive.terms import TIME, Definition, components, defined, symbol_of
-from ballpass.derive.variables import Input, turned
+from ballpass.derive.variables import Input, Terms, turned
 from ballpass.runtime.contract.manifest import TurningInfo
 
 #: How long a load without an end acts, longer than any run [s].
@@ -36,13 +36,10 @@ FOR_EVER = 10**9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RingLoad:
+class RingLoad(Terms):
     """Force on the inner ring [N] and what it is made of."""
 
     force: tuple[sp.Expr, sp.Expr]
-    inputs: tuple[Input, ...] = ()
-    constants: tuple[Definition, ...] = ()
-    definitions: tuple[Definition, ...] = ()
 
 
 def load_on(bearing: Bearing, own: RingLoad, linkage: Linkage | None, reactions: Reactions | None) -> Pair | None:

@@ -12,23 +12,14 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.terms import Definition, Smoothness
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, Terms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OverAngle:
-    """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
-
-    `smoothness` is by name, of functions of the state; `switches` are the places where they jump.
-    `constants` are derived constants of the value.
-    """
+class OverAngle(Terms):
+    """Something that changes with the driver's angle: its value, and what this is made of."""
 
     value: sp.Expr
-    constants: tuple[Definition, ...] = ()
-    inputs: tuple[Input, ...] = ()
-    definitions: tuple[Definition, ...] = ()
-    smoothness: tuple[tuple[str, Smoothness], ...] = ()
-    switches: tuple[StateSwitch, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.terms import Definition
-from ballpass.derive.variables import DRIVER_ANGLE
+from ballpass.derive.variables import DRIVER_ANGLE, Terms
 
 #: Angles of the driver at which the ideal linkage is evaluated.
 POINTS = 48
@@ -54,7 +54,7 @@ def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Swing:
+class Swing(Terms):
     """Angle of a body: ``turns * driver's angle + swing``.
 
     Attributes
@@ -70,8 +70,6 @@ class Swing:
     swing: sp.Expr = sp.S.Zero
     at_start: sp.Expr = sp.S.Zero
     rate: sp.Expr
-    constants: tuple[Definition, ...] = ()
-    definitions: tuple[Definition, ...] = ()
 
 
 #: A body that does not turn.

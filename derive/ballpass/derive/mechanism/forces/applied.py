@@ -12,30 +12,23 @@ from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.records import Force, Mechanism
-from ballpass.derive.terms import Definition, Smoothness
-from ballpass.derive.variables import Input, Output, StateSwitch
+from ballpass.derive.variables import Output, Terms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Forces:
-    """Loads on the bodies, with their definitions, inputs and outputs.
+class Forces(Terms):
+    """Loads on the bodies, what they are made of, and outputs.
 
-    `of_each` are the loads by the label of their force, `requested` are outputs on request, `smoothness` is by name, of
-    loads with jumps or kinks that depend on the motion, and `switches` are their places.
+    `of_each` are the loads by the label of their force, `requested` are outputs on request.
     """
 
     loads: tuple[AppliedLoad, ...]
     of_each: Mapping[str, tuple[AppliedLoad, ...]]
-    definitions: tuple[Definition, ...]
-    inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
     requested: tuple[Output, ...] = ()
-    smoothness: tuple[tuple[str, Smoothness], ...] = ()
-    switches: tuple[StateSwitch, ...] = ()
-    constants: tuple[Definition, ...] = ()
 
 
-NO_FORCES = Forces(loads=(), of_each=MappingProxyType({}), definitions=(), inputs=(), outputs=())
+NO_FORCES = Forces(loads=(), of_each=MappingProxyType({}), outputs=())
 
 
 def derive_forces(linkage: Linkage) -> Forces:
