@@ -100,7 +100,7 @@ def test_a_command_in_a_pipe_writes_how_far_a_long_stage_is(
     now = [0.0]
     monkeypatch.setattr(shared, "time", SimpleNamespace(perf_counter=lambda: now[0]))
     with shared.Stages() as stages:
-        stages("simulate")
+        stages("simulating")
         for second in range(1, 31):
             now[0] = float(second)
             stages.fraction(second / 40)

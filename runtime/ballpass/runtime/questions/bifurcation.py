@@ -185,7 +185,7 @@ def _figures(_model: AnyModel, found: Bifurcation, _parameters: object) -> Itera
     yield "bifurcation", draw_bifurcation(found.vary, found.state, found.unit, found.row, found.up, found.down)
 
 
-@Question(stage="simulate", figures=_figures, needs="scipy", requires="bearings")
+@Question(figures=_figures, needs="scipy", requires="bearings")
 def bifurcation(
     model: AnyModel,
     vary: Vary,

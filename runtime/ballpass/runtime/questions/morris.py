@@ -119,7 +119,7 @@ def _figures(_model: AnyModel, found: MorrisAnswer, _parameters: object) -> Iter
         yield ("morris" if k == 0 else f"morris_{k + 1}"), draw_effects(one.name, one.unit, found.inputs, one.effects)
 
 
-@Question(stage="simulate", figures=_figures, needs="scipy")
+@Question(figures=_figures, needs="scipy")
 def morris(
     model: AnyModel,
     vary: Spread,

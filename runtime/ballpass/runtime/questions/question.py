@@ -50,7 +50,7 @@ class Question:
     """
 
     name: str = ""
-    stage: str = "simulate"
+    stage: str = "simulating"
     needs: str = ""
     check: Callable[[Mapping[str, Any]], None] | None = None
     runs: bool = True

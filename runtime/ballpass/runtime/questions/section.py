@@ -202,7 +202,7 @@ def _figures(_model: AnyModel, found: PoincareSection, _parameters: object) -> I
     yield "section", draw_section(found.states, found.phase, found.around, *names, curve, words)
 
 
-@Question(stage="simulate", samples=True, figures=_figures, requires="bearings")
+@Question(samples=True, figures=_figures, requires="bearings")
 def section(
     model: AnyModel,
     of: State = None,

@@ -267,7 +267,7 @@ def _check(values: Mapping[str, Any]) -> None:
         raise RequestError('of: no quantity was named. Give one (--of), or a limit of one (--limit "Q <= VALUE").')
 
 
-@Question(stage="simulate", figures=_figures, needs="scipy", check=_check)
+@Question(figures=_figures, needs="scipy", check=_check)
 def sobol(
     model: AnyModel,
     vary: Spread,

@@ -336,7 +336,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
 
 
 @Question(
-    stage="spectrum",
+    stage="computing the spectrum",
     samples=True,
     needs="scipy",
     check=_check,

@@ -254,7 +254,7 @@ def _figures(_model: AnyModel, found: SteadyState, _parameters: object) -> Itera
         yield "branches", draw_branches(found.branches, found.over, found.states[0], found.units[0])
 
 
-@Question(stage="simulate", figures=_figures, requires="bearings")
+@Question(figures=_figures, requires="bearings")
 def steady(
     model: AnyModel,
     turns: Turns = None,

@@ -62,7 +62,7 @@ def animate(
     Open it in a browser; its address takes an angle: animation.html#angle=90.
     """
     with command(scene) as stages:
-        stages("read")
+        stages("reading the scene")
         kind = "" if out is None or out.is_dir() else out.suffix.removeprefix(".")
         if kind in MOVING and format_ not in ("html", kind):
             raise RequestError(f"--format {format_} and --out {out} name two kinds of files. Omit --format.")
@@ -77,7 +77,7 @@ def animate(
         path = results_file(out, scene, f"animation.{format_}", MOVING)
         unknown = partial(refuse_unknown, options_in({"bearing": Shown}), {"bearing": bearing})
         model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
-        stages("simulate")
+        stages("simulating")
         solution = model.simulate(
             cycles=cycles,
             duration=duration,
@@ -86,7 +86,7 @@ def animate(
             rtol=rtol,
             progress=stages.fraction,
         )
-        stages("draw")
+        stages("drawing figures")
         from ballpass.runtime.plot.animate import write_animation
 
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -46,7 +46,7 @@ def dataset(
     A member that fails is named and has NaN for samples; the others are kept. Exit code 1 if all fail.
     """
     with command() as stages:
-        stages("read")
+        stages("reading the scene")
         from ballpass.runtime.app.commands.data_set_spec import read_spec
         from ballpass.runtime.contract.extras import need
         from ballpass.runtime.many.cluster import connected
@@ -60,7 +60,7 @@ def dataset(
         check_folder(path.parent)
         with connected(scheduler, workers) as client:
             classes = [_signal_class(one, read.signals, stages) for one in read.classes]
-            stages("simulate")
+            stages("simulating")
             report = make_data_set(
                 path,
                 classes,
@@ -94,7 +94,7 @@ def _signal_class(spec: ClassSpec, signals: Signals, stages: Stages) -> SignalCl
 
     unknown = partial(check_outputs, signals=signals, label=spec.label)
     folder = generate(spec.scene, progress=stages, inspect=unknown)
-    stages("compile")
+    stages("compiling")
     model = load_own(folder)
     if model.has_stepper:
         _ = model.stepper  # compiled here, where it is announced, and found by workers on this machine

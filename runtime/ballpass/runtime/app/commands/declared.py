@@ -205,7 +205,7 @@ def _ask(
     with command(scene) as stages:
         question.refuse(values)
         folder, formats = _place(question, scene, out, format_, figures=figures)
-        stages("read")
+        stages("reading the scene")
         model, overrides = _source(ask, scene, set_, values, stages)
         stages(question.stage)
         if "progress" in ask.__annotations__:
@@ -226,7 +226,7 @@ def _ask(
             if formats and question.figures is not None:
                 from ballpass.runtime.plot.style import write_figures
 
-                stages("draw")
+                stages("drawing figures")
                 drawn = question.figures(model, answer, overrides)
                 written += write_figures(drawn, folder, formats, f"{question.name}.md")
         for words in (*report.warnings, *_transient(question, model, values, overrides, answer)):

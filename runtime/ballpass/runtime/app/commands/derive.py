@@ -25,7 +25,7 @@ def derive(
         import ballpass.derive as deriving
 
         if check:
-            stages("check")
+            stages("deriving to compare")
             result = deriving.check(scene, out)
         else:
             folder = deriving.generate(scene, out, progress=stages)

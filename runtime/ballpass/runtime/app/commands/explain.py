@@ -37,7 +37,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     """Say what a scene models and which of its lines asked for it, what it leaves out, the cost of each part, and the
     time scales that decide about the method. Simulates nothing."""
     with command(scene) as stages:
-        stages("read")
+        stages("reading the scene")
         read, _, overrides = read_with_settings(scene, set_)
         model = load_model(scene, stages, "cvodes", asked=asked_of(read, overrides))
         from ballpass.derive.features import cost

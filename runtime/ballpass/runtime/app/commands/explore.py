@@ -33,7 +33,7 @@ def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> No
     with command(scene) as stages:
         from ballpass.runtime.export.web_assembly import check_compiler
 
-        stages("read")
+        stages("reading the scene")
         check_compiler()
         asked = read_asked(scene, None)
         path = results_file(out, scene, "explore.html", ("html",))

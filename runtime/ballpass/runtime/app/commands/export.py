@@ -58,7 +58,7 @@ def export(
             raise RequestError(f"export: {given} given. Allowed: --c, a program in C99, or --fmu, an FMU 3.0.")
         if inputs and not fmu:
             raise RequestError("export: --input is for --fmu. Values of the C program are set by its interface.")
-        stages("read")
+        stages("reading the scene")
         target = out if out is not None else Path("export") / (f"{name_of(scene)}.fmu" if fmu else name_of(scene))
         check_folder(target.parent if fmu else target)
         if fmu and target.is_dir():
@@ -84,7 +84,7 @@ def export(
             over_time = scene.is_file() and _speed_becomes_input(manifest, chosen)
         with speed_over_time(scene, stages) if over_time else nullcontext(generated_folder(scene)) as folder:
             manifest = read_artefact(folder) if over_time else manifest
-            stages("export the FMU" if fmu else "export")
+            stages("compiling the FMU" if fmu else "writing the C program")
             # here, because they import CasADi
             if fmu:
                 from ballpass.runtime.export.fmu import export_fmu

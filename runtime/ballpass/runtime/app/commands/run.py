@@ -151,7 +151,7 @@ def run(
         from ballpass.runtime.report.text import show as show_report
         from ballpass.runtime.request.locating import LOCATED, refuse_with_error
 
-        stages("read")
+        stages("reading the scene")
         formats = read_formats(format_)
         refuse_with_error(error, method=method, rtol=rtol, kinks=kinks)
         start = _read_start(initial)
@@ -175,7 +175,7 @@ def run(
             needs=needs and f"ballpass run {needs}",
             inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
         )
-        stages("simulate")
+        stages("simulating")
         length: dict[str, Any] = {"cycles": cycles, "duration": duration, "transient": transient}
         given: dict[str, Any] = {"parameters": asked.overrides, "initial": start, "sample_rate": sample_rate}
         first: dict[str, Any] = {"method": method, "rtol": rtol, "kinks": kinks}
@@ -212,7 +212,7 @@ def run(
         if chosen:
             for words in tables_left_out(model, model.numbers(asked.overrides).values):
                 warn(words)
-        stages("write")
+        stages("writing results")
         kept = solution.steady() if chosen else solution
         summary, files = _write_results(
             model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept
@@ -334,7 +334,7 @@ def _write_results(
             from ballpass.runtime.app.figure_run import run_for_figures
             from ballpass.runtime.plot.gallery import draw_all
 
-            stages("draw")
+            stages("drawing figures")
             draw_all(model, solution, made, formats, run_for_figures(model, solution))
         return summary
 

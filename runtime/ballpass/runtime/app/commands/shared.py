@@ -57,20 +57,11 @@ NO_DERIVE = (
 #: Time without a line of progress where no bar can move [s].
 QUIET = 10.0
 
-#: Names of the stages as they are announced.
+#: Stages of a derivation as they are announced; others have their words.
 STAGES = {
-    "read": "reading the scene",
     "derive": "deriving equations",
     "lower": "building functions",
     "emit": "generating C",
-    "check": "deriving to compare",
-    "compile": "compiling",
-    "export": "writing the C program",
-    "export the FMU": "compiling the FMU",
-    "simulate": "simulating",
-    "spectrum": "computing the spectrum",
-    "draw": "drawing figures",
-    "write": "writing results",
 }
 
 
@@ -346,7 +337,7 @@ def load_model(
         need_compiler(needs or f"method {method}")
 
     def compiled(folder: Path, own: bool) -> Model:
-        stages("compile")
+        stages("compiling")
         return load_own(folder) if own else load(folder)
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)

@@ -35,11 +35,11 @@ def stream(
 ) -> None:
     """Simulate into a file, piece by piece, for any length; ballpass spectrum and ballpass run --initial read it."""
     with command(scene) as stages:
-        stages("read")
+        stages("reading the scene")
         asked = read_asked(scene, set_, cycles, duration, 0.0)
         unknown = partial(refuse_unknown, options_in({"of": Of}), {"of": of})
         model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
-        stages("simulate")
+        stages("simulating")
         statistics = model.stream(
             out,
             sample_rate=sample_rate,

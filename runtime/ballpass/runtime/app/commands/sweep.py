@@ -134,7 +134,7 @@ def sweep(
     from ballpass.runtime.quantity.grammar import default_quantities
 
     with command(scene) as stages:
-        stages("read")
+        stages("reading the scene")
         source: Scene | Manifest
         # how many turns a duration is, members with other speeds decide
         length = (cycles, None, transient) if duration is None else ()
@@ -161,7 +161,7 @@ def sweep(
             )
             if model.states:
                 _ = model.ensemble_driver  # compiled here, where it is announced
-            stages("simulate")
+            stages("simulating")
             result = model.simulate_many(
                 {**varied, **fixed},
                 of or default_compared(model.manifest) or default_quantities(model.manifest),
@@ -179,7 +179,7 @@ def sweep(
         refused = [failure for failure in result.failures if failure.status == "REFUSED"]
         if len(refused) == count:
             raise RequestError(f"--vary: none of the {count} members can be simulated. The first: {refused[0].message}")
-        stages("write")
+        stages("writing results")
         swept = Sweep(result=result, ranges=ranges, fixed=overrides)
         for member in dict.fromkeys((0, count - 1)):
             at = {name: float(values[member]) for name, values in varied.items()}
