@@ -16,10 +16,7 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.terms import TIME
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output
-
-#: Name, expression, unit and description of an output.
-Words = tuple[str, sp.Expr, str, str]
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output, Words
 
 #: Key of the scene file under which its outputs stand.
 OUTPUTS = "run.outputs"

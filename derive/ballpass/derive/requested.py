@@ -21,10 +21,10 @@ from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.outputs import Words, made, named_rings
+from ballpass.derive.outputs import made, named_rings
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import Definition, Names, symbol_of
-from ballpass.derive.variables import Output
+from ballpass.derive.variables import Output, Words
 
 APPLIED = "Power of the drive, forces and torques, and of loads on rings loaded one-way"
 
@@ -150,11 +150,12 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
         energy = count * force * ball.deflection / (element.exponent + 1)
         words = f"Potential energy of the elastic forces of all {element.noun}s{of}"
         out.append(_of_balls(names, "contact.energy", energy, "J", words, over_balls=True))
+    contact = f"each {element.noun}'s contact{of}"
     for ring, (constants, quantities) in element.contact_quantities(bearing, names, force).items():
-        for one in quantities:
-            value = sp.Piecewise((one.expression, force > 0), (0, True))
-            words = one.description.format(f"each {element.noun}'s contact{of}")
-            out.append(_of_balls(names, f"ball.{ring}_{one.name}", value, one.unit, words, constants=constants))
+        for name, expression, unit, words in quantities:
+            value = sp.Piecewise((expression, force > 0), (0, True))
+            described = words.format(contact)
+            out.append(_of_balls(names, f"ball.{ring}_{name}", value, unit, described, constants=constants))
     return out
 
 

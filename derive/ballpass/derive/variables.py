@@ -13,6 +13,9 @@ from ballpass.runtime.contract.manifest import TurningInfo
 #: Angle of the body that the drive turns [rad].
 DRIVER_ANGLE = sp.Symbol("driver.angle", real=True)
 
+#: Name, expression, unit and description of an output.
+Words = tuple[str, sp.Expr, str, str]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Input:

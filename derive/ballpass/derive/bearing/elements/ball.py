@@ -9,7 +9,6 @@ import sympy as sp
 
 from ballpass.derive.bearing.elements import hertz
 from ballpass.derive.bearing.elements.element import (
-    ContactQuantity,
     RollingElement,
     compliance,
     raceway_radius,
@@ -19,6 +18,7 @@ from ballpass.derive.scene.bearing_records import GivenContact, HertzContact
 from ballpass.derive.scene.designations import GROOVES
 from ballpass.derive.scene.units import QuantityError, parse_quantity
 from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.derive.variables import Words
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
@@ -106,7 +106,7 @@ class Ball(RollingElement):
 
     def contact_quantities(
         self, bearing: Bearing, names: Names, force: sp.Expr
-    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[ContactQuantity]]]:
+    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[Words]]]:
         contact = bearing.contact
         if isinstance(contact, GivenContact):
             return {}
@@ -139,8 +139,7 @@ class Ball(RollingElement):
                 ("major_axis", major * root, "m", f"{half} {at}, across the groove"),
                 ("minor_axis", minor * root, "m", f"{half} {at}, along the groove"),
             )
-            made = [ContactQuantity(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
-            out[ring] = constants, (*made, self.approach(ring, names, force))
+            out[ring] = constants, (*rows, self.approach(ring, names, force))
         return out
 
     def _grooves(self, bearing: Bearing) -> tuple[SceneNumber, ...]:

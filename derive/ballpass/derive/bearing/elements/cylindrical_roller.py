@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import sympy as sp
 
-from ballpass.derive.bearing.elements.element import ContactQuantity, RollingElement, compliance, raceway_radius
+from ballpass.derive.bearing.elements.element import RollingElement, compliance, raceway_radius
 from ballpass.derive.scene.bearing_records import Material, smoothing_key
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import positive
 from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.derive.variables import Words
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
@@ -113,7 +114,7 @@ class CylindricalRoller(RollingElement):
 
     def contact_quantities(
         self, bearing: Bearing, names: Names, force: sp.Expr
-    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[ContactQuantity]]]:
+    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[Words]]]:
         contact = bearing.contact
         if isinstance(contact, GivenLineContact):
             return {}
@@ -153,6 +154,5 @@ class CylindricalRoller(RollingElement):
                 ("pressure", pressure * root, "Pa", f"Peak pressure of {at}"),
                 ("half_width", width * root, "m", f"Half width of {at}"),
             )
-            made = [ContactQuantity(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
-            out[ring] = constants, (*made, self.approach(ring, names, force))
+            out[ring] = constants, (*rows, self.approach(ring, names, force))
         return out

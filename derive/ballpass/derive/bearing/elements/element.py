@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -22,6 +21,7 @@ from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.read_keys import Either, keys_of, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.derive.variables import Words
 from ballpass.runtime.ratings.elements import RATED, RatedElement
 
 if TYPE_CHECKING:
@@ -31,16 +31,6 @@ if TYPE_CHECKING:
 
 #: What placeholders in the keys of materials stand for.
 RINGS: Fill = MappingProxyType({"PART": "rings", "_OF": ""})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactQuantity:
-    """A quantity of the contact with one ring: what its name ends with, its expression over the force, and words."""
-
-    name: str
-    expression: sp.Expr
-    unit: str
-    description: str
 
 
 class RollingElement(ABC):
@@ -136,19 +126,17 @@ class RollingElement(ABC):
     @abstractmethod
     def contact_quantities(
         self, bearing: Bearing, names: Names, force: sp.Expr
-    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[ContactQuantity]]]:
+    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[Words]]]:
         """Pressure, half axes and approach under a force, by ring, and constants they use; none for a given stiffness.
 
         The constants use those of `stiffness`.
         """
 
-    def approach(self, ring: str, names: Names, force: sp.Expr) -> ContactQuantity:
+    def approach(self, ring: str, names: Names, force: sp.Expr) -> Words:
         """Approach of the element and a ring whose stiffness factor `ring_stiffnesses` defines."""
         factor = names.constant(f"k_{ring[0]}")
         words = f"Approach of {{}} with the {ring} ring"
-        return ContactQuantity(
-            name="approach", expression=(force / factor) ** (1 / self.exponent), unit="m", description=words
-        )
+        return "approach", (force / factor) ** (1 / self.exponent), "m", words
 
     def _in_unit(self, text: str) -> str:
         for old, new in self.fill.items():
