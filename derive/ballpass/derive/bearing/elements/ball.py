@@ -80,27 +80,16 @@ class Ball(RollingElement):
             ratio, curvature = names.constant(f"{ring}_curvature_ratio"), names.constant(f"{ring}_curvature_sum")
             kappa, factor = names.constant(f"{ring}_ellipticity"), names.constant(f"k_{letter}")
             ratio_of, sum_of = hertz.curvature_ratio(ball_diameter, sign * raceway, symbol_of(groove))
-            out += [
-                raceway_radius(ring, bearing, names),
-                names.define(
-                    ratio,
-                    ratio_of,
-                    "1",
-                    f"Ratio of the principal curvature sums at the {ring} contact",
-                    rf"(A/B)_{letter}",
-                ),
-                names.define(curvature, sum_of, "1/m", f"Curvature sum at the {ring} contact", rf"\Sigma\rho_{letter}"),
-                names.define(
-                    kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b of the {ring} contact", rf"\kappa_{letter}"
-                ),
-                names.define(
-                    factor,
-                    hertz.contact_stiffness(kappa=kappa, curvature_sum=curvature, compliance=compliance(contact)),
-                    self.stiffness_unit,
-                    f"Stiffness factor of the {ring} contact",
-                    f"k_{letter}",
-                ),
-            ]
+            stiffness = hertz.contact_stiffness(kappa=kappa, curvature_sum=curvature, compliance=compliance(contact))
+            of = f"of the {ring} contact"
+            rows = (
+                (ratio, ratio_of, "1", f"Ratio of the principal curvature sums at the {ring} contact", "(A/B)"),
+                (curvature, sum_of, "1/m", f"Curvature sum at the {ring} contact", r"\Sigma\rho"),
+                (kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b {of}", r"\kappa"),
+                (factor, stiffness, self.stiffness_unit, f"Stiffness factor {of}", "k"),
+            )
+            out.append(raceway_radius(ring, bearing, names))
+            out += [names.define(*row, f"{latex}_{letter}") for *row, latex in rows]
             factors.append(factor)
         return out, factors
 
@@ -121,25 +110,18 @@ class Ball(RollingElement):
             )
             words, over = f"of the {ring} contact's ellipse", "over the cube root of the force"
             at, half = f"{{}} with the {ring} ring", "Half axis of the ellipse of"
+            peak = hertz.peak_pressure(major, minor)
             constants = (
-                names.define(
-                    major, axes[0], "m/N^(1/3)", f"Half axis {words} across the groove, {over}", f"a_{letter}"
-                ),
-                names.define(minor, axes[1], "m/N^(1/3)", f"Half axis {words} along the groove, {over}", f"b_{letter}"),
-                names.define(
-                    pressure,
-                    hertz.peak_pressure(major, minor),
-                    "Pa/N^(1/3)",
-                    f"Peak pressure of the {ring} contact, {over}",
-                    f"p_{letter}",
-                ),
+                (major, axes[0], "m/N^(1/3)", f"Half axis {words} across the groove, {over}", f"a_{letter}"),
+                (minor, axes[1], "m/N^(1/3)", f"Half axis {words} along the groove, {over}", f"b_{letter}"),
+                (pressure, peak, "Pa/N^(1/3)", f"Peak pressure of the {ring} contact, {over}", f"p_{letter}"),
             )
             rows = (
                 ("pressure", pressure * root, "Pa", f"Peak pressure of {at}"),
                 ("major_axis", major * root, "m", f"{half} {at}, across the groove"),
                 ("minor_axis", minor * root, "m", f"{half} {at}, along the groove"),
             )
-            out[ring] = constants, (*rows, self.approach(ring, names, force))
+            out[ring] = tuple(names.define(*row) for row in constants), (*rows, self.approach(ring, names, force))
         return out
 
     def _grooves(self, bearing: Bearing) -> tuple[SceneNumber, ...]:

@@ -101,14 +101,9 @@ class CylindricalRoller(RollingElement):
         softer = (compliance(contact) / STEEL) ** sp.Rational(9, 10)
         approach = APPROACH * softer * symbol_of(contact.length) ** sp.Rational(-4, 5)
         factors = [names.constant(f"k_{ring[0]}") for ring in ("inner", "outer")]
+        value, unit = approach**-self.exponent, self.stiffness_unit
         return [
-            names.define(
-                factor,
-                approach**-self.exponent,
-                self.stiffness_unit,
-                f"Stiffness factor of the {ring} contact",
-                f"k_{ring[0]}",
-            )
+            names.define(factor, value, unit, f"Stiffness factor of the {ring} contact", f"k_{ring[0]}")
             for factor, ring in zip(factors, ("inner", "outer"), strict=True)
         ], factors
 
@@ -125,34 +120,17 @@ class CylindricalRoller(RollingElement):
             curvature = names.constant(f"{ring}_curvature_sum")
             width, pressure = names.constant(f"{ring}_half_width"), names.constant(f"{ring}_pressure")
             over, root = "over the root of the force", sp.sqrt(force)
+            both = 2 / symbol_of(bearing.ball_diameter) + sign / radius.symbol
+            half, peak = sp.sqrt(4 * soft / (sp.pi * length * curvature)), sp.sqrt(curvature / (sp.pi * length * soft))
             constants = (
-                radius,
-                names.define(
-                    curvature,
-                    2 / symbol_of(bearing.ball_diameter) + sign / radius.symbol,
-                    "1/m",
-                    f"Curvature sum at the {ring} contact",
-                    rf"\Sigma\rho_{letter}",
-                ),
-                names.define(
-                    width,
-                    sp.sqrt(4 * soft / (sp.pi * length * curvature)),
-                    "m/N^0.5",
-                    f"Half width of the {ring} contact, {over}",
-                    f"b_{letter}",
-                ),
-                names.define(
-                    pressure,
-                    sp.sqrt(curvature / (sp.pi * length * soft)),
-                    "Pa/N^0.5",
-                    f"Peak pressure of the {ring} contact, {over}",
-                    f"p_{letter}",
-                ),
+                (curvature, both, "1/m", f"Curvature sum at the {ring} contact", rf"\Sigma\rho_{letter}"),
+                (width, half, "m/N^0.5", f"Half width of the {ring} contact, {over}", f"b_{letter}"),
+                (pressure, peak, "Pa/N^0.5", f"Peak pressure of the {ring} contact, {over}", f"p_{letter}"),
             )
             at = f"{{}} with the {ring} ring"
             rows = (
                 ("pressure", pressure * root, "Pa", f"Peak pressure of {at}"),
                 ("half_width", width * root, "m", f"Half width of {at}"),
             )
-            out[ring] = constants, (*rows, self.approach(ring, names, force))
+            out[ring] = (radius, *(names.define(*row) for row in constants)), (*rows, self.approach(ring, names, force))
         return out
