@@ -43,21 +43,8 @@ if TYPE_CHECKING:
 
 #: Every file that a derivation writes.
 GENERATED = (
-    "EQUATIONS.md",
-    "ensemble_kernels.h",
-    "equations.c",
-    "equations.casadi",
-    "equations.h",
-    "jacobians.c",
-    "jacobians.casadi",
-    "jacobians.h",
-    "kernels.h",
-    mf.FILE_NAME,
-    "model.c",
-    "model.casadi",
-    "model.h",
-    "switches.h",
-    "tangents.h",
+    *("EQUATIONS.md", mf.FILE_NAME, "ensemble_kernels.h", "kernels.h", "switches.h", "tangents.h"),
+    *(f"{library}.{kind}" for library in (mf.MODEL, mf.EQUATIONS, mf.JACOBIANS) for kind in ("c", "casadi", "h")),
 )
 
 
