@@ -109,6 +109,11 @@ class Tableau:
         """Slopes, or linear systems, of a step; the first slope of an explicit method is known from the step before."""
         return len(self.nodes)
 
+    @property
+    def error_exponent(self) -> int:
+        """q in error ∝ h**q, for the step size controller."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExplicitTableau(Tableau):

@@ -81,15 +81,15 @@ class Ball(RollingElement):
             kappa, factor = names.constant(f"{ring}_ellipticity"), names.constant(f"k_{letter}")
             ratio_of, sum_of = hertz.curvature_ratio(ball_diameter, sign * raceway, symbol_of(groove))
             stiffness = hertz.contact_stiffness(kappa=kappa, curvature_sum=curvature, compliance=compliance(contact))
-            of = f"of the {ring} contact"
+            contacts = f"the {ring} contact"
             rows = (
-                (ratio, ratio_of, "1", f"Ratio of the principal curvature sums at the {ring} contact", "(A/B)"),
-                (curvature, sum_of, "1/m", f"Curvature sum at the {ring} contact", r"\Sigma\rho"),
-                (kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b {of}", r"\kappa"),
-                (factor, stiffness, self.stiffness_unit, f"Stiffness factor {of}", "k"),
+                (ratio, ratio_of, "1", f"Ratio of the principal curvature sums at {contacts}", f"(A/B)_{letter}"),
+                (curvature, sum_of, "1/m", f"Curvature sum at {contacts}", rf"\Sigma\rho_{letter}"),
+                (kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b of {contacts}", rf"\kappa_{letter}"),
+                (factor, stiffness, self.stiffness_unit, f"Stiffness factor of {contacts}", f"k_{letter}"),
             )
             out.append(raceway_radius(ring, bearing, names))
-            out += [names.define(*row, f"{latex}_{letter}") for *row, latex in rows]
+            out += [names.define(*row) for row in rows]
             factors.append(factor)
         return out, factors
 
