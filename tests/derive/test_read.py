@@ -262,13 +262,13 @@ def test_other_values_meet_the_checks_of_a_file(path: str, value: float, words: 
 
 
 def test_all_faults_of_other_values_are_raised_together() -> None:
-    bad = {"mechanism.bodies.crank.mass": -1.0, "bearing.ball_diameter": 0.0, "bearing.share": 2.0}
+    bad = {"mechanism.bodies.crank.mass": -1.0, "bearing.ball_diameter": 0.0, "bearing.contact.poisson_ratio": 2.0}
     with pytest.raises(SceneError) as caught:
         with_values(scene_from_text(PRESS, "press"), bad)
     assert [fault.key for fault in caught.value.faults] == [
         "mechanism.bodies.crank.mass",
-        "bearing.share",
         "bearing.ball_diameter",
+        "bearing.contact.poisson_ratio",
     ]
 
 

@@ -19,7 +19,6 @@ from ballpass.runtime import Model, RequestError
     [
         ("mechanism.bodies.slider.mass", -1.0, "allowed is a number above 0 [kg], not -1."),
         ("mechanism.bodies.crank.points.B", 0.0, "allowed is a number above 0 [m], not 0."),
-        ("bearing.share", 1.5, "allowed is a number from 0 to 1 [1], not 1.5."),
         ("bearing.outer_ring.stiffness", -5e7, "allowed is a number from 0 [N/m], not -50000000."),
         ("bearing.contact.poisson_ratio", 0.5, "allowed is a number above -1 below 0.5 [1], not 0.5."),
         ("bearing.contact.inner_groove_radius", 3.9e-3, "allowed is a number above 0.5 times bearing.ball_diameter"),

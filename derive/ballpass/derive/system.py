@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -25,7 +25,7 @@ from ballpass.derive.bearing.equations import (
     ring_motion,
 )
 from ballpass.derive.bearing.equivalent_mass import inner_mass
-from ballpass.derive.bearing.ring_load import RingLoad, load_on, own_loads
+from ballpass.derive.bearing.ring_load import RingLoad, lever_of, load_on, own_loads
 from ballpass.derive.bearing.two_way import Coupled, carriers_of, couple, play_of
 from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
@@ -274,7 +274,11 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
     if massless or (linkage is not None and reactions is None):
         return None
     own = own_loads(scene, drive)
-    loads = [load_on(bearing, own, linkage, reactions) for bearing in bearings]
+    levers = [lever_of(bearing, bearings) for bearing in bearings]
+    own = replace(
+        own, constants=(*own.constants, *(d for lever in levers if lever is not None for d in lever.constants))
+    )
+    loads = [load_on(bearing, own, linkage, reactions, lever) for bearing, lever in zip(bearings, levers, strict=True)]
     return _Parts(
         scene=scene,
         drive=drive,

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.kinematics import Pair, add, scale
+from ballpass.derive.mechanism.kinematics import ZERO, Pair, add, scale
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import (
-    FRAME,
     ConstantLoad,
     HarmonicLoad,
     Load,
@@ -37,24 +36,79 @@ FOR_EVER = 10**9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RingLoad(Terms):
-    """Force on the inner ring [N] and what it is made of."""
+    """Force on the inner ring [N], its moment about the plane z = 0 [N*m], and what they are made of."""
 
     force: tuple[sp.Expr, sp.Expr]
+    moment: Pair = ZERO
 
 
-def load_on(bearing: Bearing, own: RingLoad, linkage: Linkage | None, reactions: Reactions | None) -> Pair | None:
+def load_on(
+    bearing: Bearing, own: RingLoad, linkage: Linkage | None, reactions: Reactions | None, lever: Lever | None
+) -> Pair | None:
     """Force on an inner ring that is loaded one-way: its share of the reaction of its joint, and loads of the scene.
 
     On a shaft it has a share of these; the reaction is that of the body it carries on the frame.
+
+    Parameters
+    ----------
+    lever : of a bearing that has a place along the shaft, which bears all forces by it
     """
     share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
     if linkage is None or reactions is None:
-        return scale(share, own.force)
+        return scale(share, own.force) if lever is None else lever.bears(own.force, own.moment)
     if bearing.coupling == "two-way":
         return None
     joint = linkage.driver  # the reader refuses another one
-    sign = 1 if joint.bodies[0] == FRAME else -1
-    return add(scale(sign * share, reactions.joint_force[joint.name]), own.force)
+    reaction = reactions.joint_force[joint.name]
+    if lever is None:
+        return add(scale(share, reaction), own.force)
+    places = {name: symbol_of(place) for name, place in linkage.mechanism.body(linkage.driven).positions}
+    moments = [scale(places[name], force) for name, force in reactions.on_driven if name in places]
+    return lever.bears(add(reaction, own.force), add(own.moment, *moments))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lever:
+    """How two bearings on one shaft part its forces.
+
+    Attributes
+    ----------
+    share : of a force in the plane z = 0 [1]
+    per_moment : of a force times its place along the shaft [1/m]
+    constants : both
+    """
+
+    share: sp.Symbol
+    per_moment: sp.Symbol
+    constants: tuple[Definition, ...]
+
+    def bears(self, force: Pair, moment: Pair) -> Pair:
+        """Force on the bearing: R_1 = sum of F_k (z_2 - z_k)/(z_2 - z_1)."""
+        return add(scale(self.share, force), scale(-self.per_moment, moment))
+
+
+def lever_of(bearing: Bearing, bearings: Iterable[Bearing]) -> Lever | None:
+    """The lever of a bearing that has a place along the shaft, beside the other one that has."""
+    if bearing.position is None:
+        return None
+    other = next(one for one in bearings if one.position is not None and one is not bearing)
+    assert other.position is not None  # the reader refuses any but two
+    here, there = symbol_of(bearing.position), symbol_of(other.position)
+    share = Definition(
+        symbol=sp.Symbol(f"{bearing.path}.share", real=True),
+        expression=there / (there - here),
+        unit="1",
+        description="Share of the force in the plane z = 0 that the bearing carries by levers",
+        latex="s",
+    )
+    per_moment = Definition(
+        symbol=sp.Symbol(f"{bearing.path}.lever_per_moment", real=True),
+        expression=1 / (there - here),
+        unit="1/m",
+        description="Force on the bearing for a force times its place along the shaft",
+        latex="s_M",
+    )
+    return Lever(share=share.symbol, per_moment=per_moment.symbol, constants=(share, per_moment))
 
 
 def own_loads(scene: Scene, drive: Drive) -> RingLoad:
@@ -64,14 +118,20 @@ def own_loads(scene: Scene, drive: Drive) -> RingLoad:
     ----------
     drive : of the shaft, whose angle some follow; beside a mechanism the reader refuses these
     """
-    return _sum(_windowed(load, _unwindowed(load, drive), drive) for load in scene.loads)
+    return _sum(_placed(load, _windowed(load, _unwindowed(load, drive), drive)) for load in scene.loads)
+
+
+def _placed(load: Load, full: RingLoad) -> RingLoad:
+    """The load with its moment about the plane z = 0."""
+    return full if load.position is None else replace(full, moment=scale(symbol_of(load.position), full.force))
 
 
 def _sum(parts: Iterable[RingLoad]) -> RingLoad:
     total = RingLoad(force=(sp.S.Zero, sp.S.Zero))
     for part in parts:
         total = RingLoad(
-            force=(total.force[0] + part.force[0], total.force[1] + part.force[1]),
+            force=add(total.force, part.force),
+            moment=add(total.moment, part.moment),
             inputs=(*total.inputs, *part.inputs),
             constants=(*total.constants, *part.constants),
             definitions=(*total.definitions, *part.definitions),

@@ -27,7 +27,7 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.records import Joint, Mechanism
+from ballpass.derive.scene.records import CENTER_OF_MASS, Joint, Mechanism
 from ballpass.derive.terms import components, symbol_of
 
 #: Torque of the drive on the driven body [N*m], counter-clockwise.
@@ -62,9 +62,13 @@ class Guide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppliedLoad:
-    """A force [N] in the frame's axes on a point [m] in body axes, or a torque [N*m], that acts on a moving body."""
+    """A force [N] in the frame's axes on a point [m] in body axes, or a torque [N*m], that acts on a moving body.
+
+    `at` names the point.
+    """
 
     body: str
+    at: str = ""
     point: Pair = ZERO
     force: Pair = ZERO
     torque: sp.Expr = sp.S.Zero
@@ -185,11 +189,15 @@ class Balance:
         # A slider on a fixed guide may have no moment of inertia: it does not turn.
         return sp.S.Zero if inertia is None else symbol_of(inertia) * self._poses[body].acceleration
 
+    def known_forces(self, body: str) -> list[tuple[str, Pair]]:
+        """Weight and inertia, applied loads and reactions already solved, with the names of their points."""
+        joints = [(c.joint.point(body), scale(c.sign(body), c.force)) for c in self._solved if body in c.joint.bodies]
+        applied = [(load.at, load.force) for load in self._loads if load.body == body]
+        return [(CENTER_OF_MASS, self._weight_and_inertia(body)), *applied, *joints]
+
     def known_force(self, body: str) -> Pair:
         """Sum of applied loads, weight, inertia and reactions already solved."""
-        joints = [scale(c.sign(body), c.force) for c in self._solved if body in c.joint.bodies]
-        applied = [load.force for load in self._loads if load.body == body]
-        return add(self._weight_and_inertia(body), *applied, *joints)
+        return add(*(force for _, force in self.known_forces(body)))
 
     def known_moment(self, body: str, about: Pair) -> sp.Expr:
         """Moment of the same about a body point."""

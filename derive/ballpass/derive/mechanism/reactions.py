@@ -37,6 +37,7 @@ class Reactions:
     joint_moment : by prismatic joint, moment [N*m] of ``bodies[1]`` on ``bodies[0]`` with the force at ``points[1]``; a
         joint whose moment was not asked for is none of them
     drive_torque : torque [N*m] of the drive on the driven body, counter-clockwise
+    on_driven : forces [N] on the driven body but that of the driver's joint, with the names of their points
     """
 
     matrix: sp.ImmutableMatrix
@@ -47,6 +48,7 @@ class Reactions:
     joint_force: Mapping[str, Pair]
     joint_moment: Mapping[str, sp.Expr]
     drive_torque: sp.Expr
+    on_driven: tuple[tuple[str, Pair], ...]
 
 
 def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: frozenset[str]) -> Reactions:
@@ -73,6 +75,7 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     for placement in reversed(linkage.placements):
         placement.dyad.solve(ledger, balance, placement)
     torque = -balance.known_moment(driven, joint_point(mechanism, driver, driven))
+    on_driven = tuple(balance.known_forces(driven))
     balance.solve_hinge_by_forces(ledger, driver, driven)
     ledger.define(DRIVE_TORQUE.name, torque, "N*m", f"torque of the drive on {driven}, counter-clockwise", "M_d")
     forces = {joint.name: balance.force_symbols(ledger, joint) for joint in mechanism.joints}
@@ -85,6 +88,7 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
         joint_force=MappingProxyType(forces),
         joint_moment=MappingProxyType({n: c.moment for n, c in balance.contacts.items() if c.moment is not None}),
         drive_torque=DRIVE_TORQUE,
+        on_driven=on_driven,
     )
 
 

@@ -65,6 +65,8 @@ def _one_way(table: dict[str, Any], side_by_side: float) -> dict[str, Any]:
 
 
 def _two_way(table: dict[str, Any], *, alone: bool, first: bool) -> dict[str, Any]:
+    if "position" in table:
+        _refuse("coupled two-way, bearings stand in the plane of the linkage", "bearings with a share")
     share = parse_quantity(table.get("share", 1), "1") if alone else 1.0
     rest = {key: value for key, value in table.items() if key not in ("share", "inner_ring")}
     if not first and isinstance(rest.get("initial"), dict):  # its inner ring moves as that of the first

@@ -258,7 +258,13 @@ def _read(root: Table, name: str) -> Scene:
         if shaft is not None and shaft.ring == "outer":
             _refuse_unbalance(root, loads)
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
+        _check_positions(root, bearings)
+        if not any(bearing.position for bearing in bearings):
+            driven = None
+            _refuse_places(root, [load.path for load in loads if load.position is not None])
         if mechanism is not None:
+            named = [body.name for body in mechanism.bodies if body.positions and body.name != driven]
+            _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
             _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads)
         speeds = mechanism.driver.table if mechanism is not None else None
@@ -413,6 +419,34 @@ def _check_couplings(root: Table, bearings: Sequence[Bearing]) -> None:
             given=f"one-way: {listing(one_way)}; two-way: {listing(two_way)}",
             allowed="one coupling for all bearings of a scene",
             remedy='give all of them coupling = "two-way", or none',
+        )
+
+
+def _check_positions(root: Table, bearings: Sequence[Bearing]) -> None:
+    """Levers part the forces on a shaft between two bearings."""
+    placed = [bearing for bearing in bearings if bearing.position is not None]
+    values = {bearing.position.value for bearing in placed if bearing.position is not None}
+    if not placed or (len(bearings) == len(placed) == 2 and len(values) == 2):
+        return
+    root.fault(
+        f"{placed[0].path}.position",
+        "levers part the forces on a shaft between two bearings at two places",
+        given=f"places of {len(placed)} of {len(bearings)} bearings"
+        if len(values) == len(placed)
+        else "one place twice",
+        allowed="position at both of two bearings, and unlike",
+        remedy="give both a position; with one bearing or more than two, write share",
+    )
+
+
+def _refuse_places(root: Table, paths: Sequence[str]) -> None:
+    """Places along the shaft are those of what bearings with places carry by levers."""
+    for path in paths:
+        root.fault(
+            path,
+            "no bearing carries this by levers",
+            allowed="places of the driven body's points, and of loads, where both bearings have a position",
+            remedy="delete it, or give both bearings a position in place of share",
         )
 
 

@@ -92,19 +92,20 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
         element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
-        joint, share, count = _read_place(table, mechanism, driven, coupling)
+        joint, share, position, count = _read_place(table, mechanism, driven, coupling)
         support, outer = _read_outer_ring(table)
         inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
         contact = table.data.get("contact")
         stiff = isinstance(contact, dict) and "stiffness" in contact
         facts = {"element": element.name, "contact": "stiffness" if stiff else "grooves"}
-        numbers = read_keys(table, {name: keys[name] for name in _NUMBERS}, choices_of(Bearing), facts)
+        numbers = read_keys(table, {name: keys[name] for name in _NUMBERS}, choices_of(Bearing)[:1], facts)
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
         numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
         return Bearing(
             name=name,
             joint=joint,
             share=share,
+            position=position,
             coupling=coupling,
             inner_body=inner_body,
             count=count,
@@ -125,16 +126,16 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 def _read_place(
     table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str
-) -> tuple[str | None, SceneNumber | None, SceneNumber | None]:
-    """Joint of a bearing, its share of the reaction, and the number of bearings side by side."""
-    keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "count")}
-    if mechanism is None:
-        keys["share"] = replace(keys["share"], optional=True)
-    else:
+) -> tuple[str | None, SceneNumber | None, SceneNumber | None, SceneNumber | None]:
+    """Joint of a bearing, its share of the reaction or its place, and the number of bearings side by side."""
+    keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "position", "count")}
+    carries = replace(choices_of(Bearing)[1], optional=mechanism is None or coupling == "two-way")
+    if mechanism is not None:
         keys["joint"] = replace(keys["joint"], example=mechanism.driver.joint or "A")
-    name, share, count = read_keys(table, keys, facts={"mechanism": mechanism, "coupling": coupling}).values()
+    facts = {"mechanism": mechanism, "coupling": coupling}
+    name, share, position, count = read_keys(table, keys, (carries,), facts).values()
     check_count(table, count)
-    place = name, share, count
+    place = name, share, position, count
     if mechanism is None:
         return place
     if not name or not mechanism.joints:

@@ -15,6 +15,7 @@ from ballpass.derive.scene.table import Table
 #: Laws of a load by its type.
 LOADS = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "table": TableLoad, "unbalance": UnbalanceLoad}
 TYPE = ChoiceKey(words="How the load changes", choices=tuple(LOADS))
+POSITION = keys_of(Load)["position"]
 #: Values of the placeholders in the keys of its windows.
 WINDOWS = {
     "window": {"UNIT": "rad", "WHAT": "Angle of the shaft", "SYMBOL": r"\theta", "FIRST": "30 deg", "LAST": "60 deg"},
@@ -25,7 +26,7 @@ WINDOWS = {
 def read_load(table: Table, name: str = "") -> Load | None:
     """A load on the inner rings; `name` of ``[loads.<name>]``."""
     with table:
-        table.know("type", *WINDOWS)
+        table.know("type", "position", *WINDOWS)
         kind = TYPE.read(table, "type")
         if kind is None or kind != table.data["type"]:
             table.know(*table.data)
@@ -37,6 +38,7 @@ def read_load(table: Table, name: str = "") -> Load | None:
         return Load(
             name=name,
             law=read_record(LOADS[kind], table, **known),
+            position=POSITION.read(table, "position"),
             angle_window=_read_window(table, "window"),
             time_window=_read_window(table, "time_window"),
         )

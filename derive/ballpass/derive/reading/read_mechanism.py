@@ -7,6 +7,7 @@ linkage can be assembled is checked later, by `derive`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ballpass.derive.drive import LAWS
@@ -17,7 +18,19 @@ from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unk
 from ballpass.derive.scene.keys import ChoiceKey, VectorKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, number, read_record
-from ballpass.derive.scene.records import FRAME, POINT, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
+from ballpass.derive.scene.records import (
+    CENTER_OF_MASS,
+    FRAME,
+    POINT,
+    POSITION,
+    Body,
+    Driver,
+    Force,
+    Joint,
+    Mechanism,
+    NamedPoint,
+    SpeedOverTime,
+)
 from ballpass.derive.scene.table import Table, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
@@ -148,9 +161,21 @@ def _read_bodies(table: Table) -> tuple[Body, ...]:
 
 def _read_body(listed: Table, name: str) -> Body:
     with listed.table(name, "mass, center_of_mass and points") as body:
-        body.know(*keys_of(Body), "points")
+        body.know(*keys_of(Body), "points", "positions")
         fill = {"NAME": name.replace("_", " "), "INDEX": upright(name)}
-        return read_record(Body, body, fill, name=name, points=_read_points(body, name))
+        points = _read_points(body, name)
+        positions = _read_positions(body, [CENTER_OF_MASS, *(point.name for point in points)])
+        return read_record(Body, body, fill, name=name, points=points, positions=positions)
+
+
+def _read_positions(body: Table, points: Sequence[str]) -> tuple[tuple[str, SceneNumber], ...]:
+    """Places of points along the shaft."""
+    if not body.has("positions"):
+        return ()
+    with body.table("positions", 'B = "-40 mm"') as listed:
+        listed.know(*points)
+        keys = {name: POSITION.filled({"POINT": name.replace("_", " "), "INDEX": upright(name)}) for name in points}
+        return tuple((name, key.read(listed, name)) for name, key in keys.items() if listed.has(name))
 
 
 def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[str]]:

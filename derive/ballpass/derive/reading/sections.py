@@ -87,6 +87,7 @@ def _mechanism() -> Iterator[Section]:
     yield Section(path=("mechanism", "frame", "points"), keys=points)
     yield _of("mechanism.bodies.*", records.Body)
     yield Section(path=("mechanism", "bodies", "*", "points"), keys=points)
+    yield Section(path=("mechanism", "bodies", "*", "positions"), keys={"*": records.POSITION.filled(NAME)})
     yield _of("mechanism.joints.*", records.Joint, branch=read_mechanism.BRANCH)
     for table in FORCE_TABLES:
         yield from _forces(table)
@@ -107,7 +108,7 @@ def _forces(table: ForceTable) -> Iterator[Section]:
 
 
 def _load() -> Iterator[Section]:
-    loads = {name: (keys_of(law), choices_of(law)) for name, law in read_load.LOADS.items()}
+    loads = {name: (keys_of(law) | keys_of(records.Load), choices_of(law)) for name, law in read_load.LOADS.items()}
     yield from _variants("load", read_load.TYPE, "type", loads)
     both = {"phase": read_load.components_of_phase()}
     yield from _variants("load", read_load.TYPE, "type", {"harmonic": (both, ())})

@@ -349,6 +349,14 @@ class Alignment:
     )
 
 
+_ONE_WAY = (
+    Needs(
+        key="coupling",
+        value="one-way",
+        why="a bearing coupled two-way takes the load that the motion gives it",
+        remedy="write count = 2 instead of share = 0.5",
+    ),
+)
 _ONLY_BALLS = (Needs(key="element", value="ball", why="a bearing of such elements has no contact angle"),)
 
 
@@ -374,6 +382,7 @@ class Bearing:
             at="axial_displacement",
             optional=True,
         ),
+        Either(what="what the bearing carries", groups=(("share",), ("position",)), at="position", optional=True),
     )
 
     name: str
@@ -395,17 +404,21 @@ class Bearing:
         "Share of the joint's reaction that the bearing carries",
         "s",
         0.5,
-        when="one-way: required with a mechanism; two-way: refused; on a shaft, of its load: all without it",
-        needs=(
-            Needs(
-                key="coupling",
-                value="one-way",
-                why="a bearing coupled two-way takes the load that the motion gives it",
-                remedy="write count = 2 instead of share = 0.5",
-            ),
-        ),
-        bounds=Bounds(least=0.0, most=1.0),
-        remedy="give the part of the load that this bearing carries: 0.5 for one of a pair",
+        when="one-way with a mechanism: this or `position`; two-way: refused; on a shaft, of its load: all without it",
+        needs=_ONE_WAY,
+        usual=UsualRange(least=-3.0, most=3.0, hint="0.5 is one of a pair; beside an overhung crank it is above 1."),
+        note="any number: a crank 40 mm before two bearings 60 mm apart loads them by 1.67 and −0.67 of the reaction",
+    )
+    position: SceneNumber | None = quantity(
+        "m",
+        "Place of the bearing along the shaft",
+        "z",
+        "40 mm",
+        optional=True,
+        when="instead of `share`, for both of two bearings on a shaft",
+        needs=_ONE_WAY,
+        note="from any plane, which is that of points and loads without a place of their own, in any direction: the "
+        "shares follow by levers, see {doc}`../theory/supports`",
     )
     coupling: Literal["one-way", "two-way"] = ChoiceKey(
         words="How bearing and linkage move each other",

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, TextKey, VectorKey, WholeKey
+from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, QuantityKey, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
@@ -37,6 +37,17 @@ def force_key(words: str, symbol: str, index: str = "", **more: Any) -> VectorKe
     return VectorKey(unit="N", words=words, symbols=("", x, y, length, angle), polar=("magnitude", "direction"), **more)
 
 
+#: Name of the centre of mass among the points of a body that have a place along the shaft.
+CENTER_OF_MASS = "center_of_mass"
+#: Place of a point of the driven body, POINT, along the shaft.
+POSITION = QuantityKey(
+    unit="m",
+    words="Place of POINT along the shaft",
+    symbol="z_{INDEX}",
+    example="-40 mm",
+    optional=True,
+    note="a point's name, or `center_of_mass`; of the driven body, where bearings have a `position`; without it zero",
+)
 #: A point of a body, POINT of the OWNER with the index INDEX.
 POINT = VectorKey(
     unit="m",
@@ -62,7 +73,7 @@ class Body:
     """A moving rigid body.
 
     `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate and whose moment balance
-    is not needed.
+    is not needed.  `positions` are places of its points along the shaft [m], of the driven body alone.
     """
 
     name: str
@@ -92,6 +103,7 @@ class Body:
         length_limits=AMOUNT,
     ).declared()
     points: tuple[NamedPoint, ...]
+    positions: tuple[tuple[str, SceneNumber], ...] = ()
 
     def point(self, name: str) -> Vector:
         """Place of a named point in body axes [m]."""
@@ -357,6 +369,14 @@ class Load:
     law: LoadLaw
     angle_window: LoadWindow | None = None
     time_window: LoadWindow | None = None
+    position: SceneNumber | None = quantity(
+        "m",
+        "Place of the load along the shaft",
+        "z_F",
+        "-40 mm",
+        optional=True,
+        note="with bearings that have a `position`; without it zero",
+    )
 
     @property
     def path(self) -> str:

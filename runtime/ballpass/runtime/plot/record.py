@@ -207,7 +207,7 @@ class Record:
 
     def bearing_share(self) -> float:
         """Part of its joint's force that the bearing carries."""
-        values, path = self.solution.parameters, "" if self.bearing is None else self.bearing.path
+        values, path = self._values, "" if self.bearing is None else self.bearing.path
         return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
 
     @property
@@ -218,8 +218,9 @@ class Record:
 
     @property
     def loaded_by_joint(self) -> bool:
-        """Whether the bearing's load is its share of a joint's reaction alone: the scene gives none beside it."""
-        given = any(name.startswith(("load.", "loads.")) for name in self.solution.parameters)
+        """Whether the bearing's load is its share of a joint's reaction alone: none is beside it or its plane."""
+        names = self.solution.parameters
+        given = any(name.startswith(("load.", "loads.")) or ".positions." in name for name in names)
         return self.manifest.mechanism is not None and not given
 
     def ring_load(self) -> Array | None:

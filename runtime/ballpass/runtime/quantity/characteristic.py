@@ -225,9 +225,9 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:
     """Whether bearings are heard in a channel: not in what an ideal linkage does, nor in a load that is given."""
-    parameters = {info.name for info in manifest.parameters}
+    known = {info.name for info in (*manifest.parameters, *manifest.constants)}
     # a bearing that takes a share of the reaction is coupled one-way
-    ideal = all(f"{bearing.path}.share" in parameters for bearing in manifest.bearings)
+    ideal = all(f"{bearing.path}.share" in known for bearing in manifest.bearings)
     loads = tuple(f"{bearing.prefix}load." for bearing in manifest.bearings)
     return not (channel.startswith(loads) or (manifest.mechanism is not None and ideal and channel.startswith(LINKAGE)))
 

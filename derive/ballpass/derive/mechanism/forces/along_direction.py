@@ -59,8 +59,10 @@ class AlongDirection(Pathway):
         def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
             both = (
-                AppliedLoad(body=self.bodies[0], point=places[0], force=pull, torque=cross(line, pull)),
-                AppliedLoad(body=self.bodies[1], point=places[1], force=scale(sp.Integer(-1), pull)),
+                AppliedLoad(
+                    body=self.bodies[0], at=self.points[0], point=places[0], force=pull, torque=cross(line, pull)
+                ),
+                AppliedLoad(body=self.bodies[1], at=self.points[1], point=places[1], force=scale(sp.Integer(-1), pull)),
             )
             return tuple(load for load in both if load.body != FRAME)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -47,7 +47,8 @@ class PointForce(Pathway):
         if self.direction is not None:
             angle = symbol_of(self.direction)
             vector = sp.cos(angle), sp.sin(angle)
-        return Action(loads=lambda amount: (AppliedLoad(body=self.body, point=point, force=scale(amount, vector)),))
+        here = AppliedLoad(body=self.body, at=self.point, point=point)
+        return Action(loads=lambda amount: (replace(here, force=scale(amount, vector)),))
 
     def words(self) -> str:
         """Force and point."""

@@ -43,8 +43,12 @@ class TwoPoints(Pathway):
 
         def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
-            ends = zip(self.bodies, places, (pull, scale(sp.Integer(-1), pull)), strict=True)
-            return tuple(AppliedLoad(body=body, point=place, force=on) for body, place, on in ends if body != FRAME)
+            ends = zip(self.bodies, self.points, places, (pull, scale(sp.Integer(-1), pull)), strict=True)
+            return tuple(
+                AppliedLoad(body=body, at=name, point=place, force=on)
+                for body, name, place, on in ends
+                if body != FRAME
+            )
 
         return Action(loads=loads, excess=lambda free: length - free, rate=rate)
 
