@@ -41,10 +41,8 @@ _NUMBER = re.compile(r"(?<![\w.±])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)(?:\s±(\d
 
 
 def half_of_last(text: str) -> float:
-    """Half a unit of the last digit of a printed number; `rounded` writes 13312.7 with four digits as 13310."""
+    """Half a unit of the last digit of a printed number."""
     mantissa, _, exponent = text.partition("e")
-    if exponent == "" and mantissa.lstrip("-").isdigit() and len(mantissa.lstrip("-")) > 4 and mantissa[-1] == "0":
-        return 0.5 * 10.0 ** (len(mantissa.lstrip("-")) - 4)
     return 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 
 
