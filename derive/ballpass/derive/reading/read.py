@@ -156,8 +156,10 @@ def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
     """Tables with changes applied, at any depth."""
     found = dict(data)
     for key, value in changes.items():
-        both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
-        found[key] = _merged(found[key], value) if both else value
+        if isinstance(value, Mapping):
+            before = found.get(key)
+            value = _merged(before if isinstance(before, Mapping) else {}, value)
+        found[key] = value
     return {key: value for key, value in found.items() if value is not None}
 
 

@@ -6,7 +6,8 @@ codes: 0 done, 1 the computation failed, 2 the request was wrong, 130 interrupte
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
@@ -21,6 +22,7 @@ from ballpass.runtime.app.commands.export import export
 from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.run import run
 from ballpass.runtime.app.commands.schema import schema
+from ballpass.runtime.app.commands.select import select
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import trade
@@ -62,5 +64,6 @@ for _panel, _commands in {
 }.items():
     for _command in _commands:
         app.command(cls=Command, rich_help_panel=_panel)(as_command(_command))
-for _question in (*QUESTIONS, trade):
+_ASKED: tuple[Callable[..., Any], ...] = (*QUESTIONS, select, trade)
+for _question in _ASKED:
     app.command(cls=Command, rich_help_panel=ASK)(question_command(_question))

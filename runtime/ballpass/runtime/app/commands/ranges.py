@@ -51,6 +51,10 @@ def read_ranges(
             other = f"--vary {seen[path]}" if path in seen else f"--set {path}"
             faults.append(f"--vary {text} and {other}: the number is given twice. Omit one of them.")
             continue
+        if path.endswith(".designation"):
+            wanted = text.partition("=")[2]
+            faults.append(f"--vary {text}: this is no number. Bearings of the tables: select --designation {wanted}.")
+            continue
         seen[path] = text
         try:
             if isinstance(source, Manifest):

@@ -1,0 +1,286 @@
+"""``ballpass select``: which bearings of the tables last long enough in a scene, the smallest first.
+
+In: a scene, what is asked of one of its bearings.  Out: a row for each bearing of the tables: life, static safety,
+highest force, and what it lacks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
+from ballpass.runtime.questions import option_names
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress
+
+if TYPE_CHECKING:
+    from ballpass.derive.scene.designations import BearingType
+    from ballpass.runtime.contract.manifest import BearingInfo
+    from ballpass.runtime.life.records import BearingStrength
+
+Of = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Further quantity of a run with each bearing, as `rms:inner.y`. May be repeated.",
+        shown="Q",
+        names=option_names.quantities,
+    ),
+]
+Designations = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Designations and patterns to choose from, as `62*,NU204`. May be repeated. Default: all of the tables.",
+        shown="PATTERN",
+        flags=("--designation",),
+    ),
+]
+Bore = Annotated[
+    str | None,
+    Option(words="Bores to choose from.", example='"20 mm:30 mm"', shown="A:B"),
+]
+Life = Annotated[
+    float | None,
+    Option(
+        words="Time that 90 % of the bearings must reach: by L_nmr where the scene says oil and dirt, else by L_10r.",
+        example='"20000 h"',
+        shown="TIME",
+        unit="s",
+        above=0.0,
+    ),
+]
+Safety = Annotated[float, Option(words="Static safety s_0 that the bearing must have.", shown="S", least=0.0)]
+At = Annotated[str | None, Option(words="Name of the bearing to choose, of several.", shown="NAME")]
+
+#: Keys of a bearing, and of its contact, that a designation gives.
+SIZES = ("element", "balls", "ball_diameter", "pitch_diameter", "dynamic_rating", "static_rating", "fatigue_limit")
+GROOVES = ("inner_groove_radius", "outer_groove_radius", "length", "stiffness")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """A bearing of the tables in the place of the scene's.
+
+    Attributes
+    ----------
+    designation, bore, outside_diameter, width : of the bearing [m]
+    of : further quantities, by name [SI]
+    hours : of the modified life where the scene says oil and dirt, else of the reference life; NaN where there is none
+    static_safety, peak_force : s_0 [1], highest force on an element [N]
+    lacks : what it has not of what is asked for, or why it was not computed; empty where it has all
+    """
+
+    designation: str
+    bore: float
+    outside_diameter: float
+    width: float
+    hours: float = math.nan
+    static_safety: float = math.nan
+    peak_force: float = math.nan
+    lacks: str = ""
+    of: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection(Reported):
+    """Bearings of the tables in a scene.
+
+    Attributes
+    ----------
+    title : of the scene
+    candidates : by bore, then by the room that they take
+    """
+
+    title: str
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """Those that lack nothing."""
+        return tuple(one for one in self.candidates if not one.lacks)
+
+    def _report(self) -> Report:
+        names = list(dict.fromkeys(name for one in self.candidates for name in one.of))
+        heads = ("bearing", "d", "D", "B", "life [h]", "s_0", "peak force [N]", *names, "lacks")
+        rows = [
+            (
+                one.designation,
+                *(f"{1e3 * size:g}" for size in (one.bore, one.outside_diameter, one.width)),
+                *("" if math.isnan(x) else rounded(x, 3) for x in (one.hours, one.static_safety, one.peak_force)),
+                *(rounded(one.of[name]) if name in one.of else "" for name in names),
+                one.lacks,
+            )
+            for one in self.candidates
+        ]
+        first = min(self.chosen, key=_room, default=None)
+        words = "No bearing of these has all that is asked for."
+        if first is not None:
+            words = (
+                f"{len(self.chosen)} of {len(rows)} have all that is asked for. {first.designation} takes least room."
+            )
+        return Report(
+            title=f"{self.title}: bearings of the tables",
+            parts=(
+                ReportTable(
+                    heads=heads,
+                    rows=rows,
+                    right=heads[1:-1],
+                    wrapped=heads[-1:],
+                    caption="d, D, B in mm. Each bearing was run in the scene with the clearance of its group, and all "
+                    "else as the scene has it, also the masses of rings.",
+                ),
+                words,
+            ),
+            facts={"title": self.title, "candidates": [asdict(one) for one in self.candidates]},
+            records=[asdict(one) for one in self.candidates],
+            index=("designation",),
+        )
+
+
+@Question(stage="choosing", requires="bearings")
+def select(
+    model: AnyModel,
+    *,
+    scene: Path,
+    life: Life = None,
+    static_safety: Safety = 1.0,
+    bore: Bore = None,
+    designations: Designations = None,
+    of: Of = None,
+    bearing: At = None,
+    cycles: Cycles = None,
+    transient: Transient = None,
+    rtol: Rtol = None,
+    parameters: Mapping[str, float],
+    progress: Progress = None,
+) -> Selection:
+    """Find the bearings of the tables that last in a scene: run it with each of them.
+
+    Parameters
+    ----------
+    scene : its file
+    parameters : overrides, SI; those of the bearing that is replaced are left out
+    progress : gets the part that is done
+
+    Raises
+    ------
+    RequestError
+        No bearing of the scene has the name, no bearing of the tables the bore or the designation.
+    """
+    from ballpass.derive import SceneError, generate, read_scene
+    from ballpass.runtime.model import load_own
+
+    if scene.is_dir():
+        raise RequestError(f"{scene} is a folder. Allowed: the scene file, whose bearing is replaced by others.")
+    info = _place(model.manifest.bearings, bearing or "")
+    kinds = list(_kinds(designations, bore))
+    kept = {name: value for name, value in parameters.items() if not name.startswith(f"{info.path}.")}
+    found = []
+    for done, kind in enumerate(kinds):
+        if callable(progress):
+            progress(done / len(kinds))
+        sizes: dict[str, Any] = {
+            "designation": kind.designation,
+            "bore": float(kind.bore) / 1e3,
+            "outside_diameter": float(kind.outside) / 1e3,
+            "width": float(kind.width) / 1e3,
+        }
+        try:
+            with_it = read_scene(scene, changes=_changes(info, kind), name=f"{model.manifest.scene}_candidate")
+            other = load_own(generate(with_it))
+            report = other.life(cycles, transient=transient, parameters=kept, rtol=rtol)
+            sizes["of"] = {
+                name: found.value
+                for name, found in (
+                    other.quantities(of, cycles, transient=transient, parameters=kept, rtol=rtol) if of else {}
+                ).items()
+            }
+        except SceneError as fault:
+            found.append(Candidate(**sizes, lacks=fault.faults[0].problem))
+        except SimulationError as fault:
+            found.append(Candidate(**sizes, lacks=str(fault).partition(". ")[0]))
+        else:
+            states = [next(one for one in state.bearings if one.name == info.name) for state in report.states]
+            over = [one.modified_hours or one.hours for one in report.duty if one.name == info.name]
+            hours = (over or [_hours(states[0])])[0]
+            found.append(_judged(sizes, states, math.nan if hours is None else hours, life, static_safety))
+    return Selection(
+        title=model.manifest.title, candidates=tuple(sorted(found, key=lambda one: (one.bore, _room(one))))
+    )
+
+
+def _room(one: Candidate) -> float:
+    return one.outside_diameter**2 * one.width
+
+
+def _hours(bearing: BearingStrength) -> float | None:
+    turns = bearing.life if bearing.modified_life is None else bearing.modified_life
+    return None if turns is None else bearing.hours(turns)
+
+
+def _judged(
+    sizes: Mapping[str, Any], states: Sequence[BearingStrength], hours: float, life: float | None, safety: float
+) -> Candidate:
+    """What a bearing has, in the worst state of a duty cycle, and lacks."""
+    least = min(one.static_safety for one in states)
+    lacks = []
+    if life is not None and not hours >= life / 3600.0:
+        why = next((one.why_no_life for one in states if one.why_no_life), "")
+        lacks.append(why or f"life: {rounded(hours, 3)} of {rounded(life / 3600.0, 3)} h")
+    if least < safety:
+        lacks.append(f"s_0: {rounded(least, 3)} of {rounded(safety, 3)}")
+    return Candidate(
+        **sizes,
+        hours=hours,
+        static_safety=least,
+        peak_force=max(one.peak_force for one in states),
+        lacks="; ".join(lacks),
+    )
+
+
+def _place(bearings: Sequence[BearingInfo], name: str) -> BearingInfo:
+    """The bearing that is replaced."""
+    names = [one.name for one in bearings]
+    if name in names:
+        return bearings[names.index(name)]
+    if not name:
+        raise RequestError(f"The scene has several bearings. Allowed: --bearing with one of {', '.join(names)}.")
+    raise RequestError(f"--bearing {name!r:.60}: the scene has no such bearing. Allowed: {', '.join(names) or 'none'}.")
+
+
+def _kinds(patterns: Sequence[str] | None, bore: str | None) -> Iterator[BearingType]:
+    """Bearings of the tables with a designation and a bore that are asked for."""
+    from ballpass.derive.scene.designations import bearing_types
+    from ballpass.runtime.app.commands.load_scene import read_value
+
+    ends = [read_value("--bore", end, "m") for end in bore.split(":")] if bore else [0.0, math.inf]
+    wanted = [one.strip() for text in patterns or ("*",) for one in text.split(",")]
+    found = [
+        kind
+        for name, kind in bearing_types().items()
+        if any(fnmatchcase(name, one) for one in wanted) and ends[0] <= float(kind.bore) / 1e3 * (1 + 1e-9)
+        if float(kind.bore) / 1e3 <= ends[-1] * (1 + 1e-9)
+    ]
+    if not found:
+        raise RequestError(
+            f"No bearing of the tables is called {', '.join(wanted):.60}{f' with a bore of {bore}' if bore else ''}. "
+            "Allowed: designations, patterns and bores of `ballpass bearings`."
+        )
+    yield from found
+
+
+def _changes(info: BearingInfo, kind: BearingType) -> dict[str, Any]:
+    """Changes of a scene that put a bearing of the tables in the place of one of its own."""
+    said = "" if info.catalogue is None else info.catalogue.clearance_group
+    said = said if said and kind.clearance(said) else "CN"
+    bearing: dict[str, Any] = dict.fromkeys(SIZES)
+    bearing |= {"designation": kind.designation, "clearance": said, "contact": dict.fromkeys(GROOVES)}
+    return {"bearings": {info.name: bearing}} if info.name else {"bearing": bearing}
