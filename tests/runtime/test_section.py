@@ -75,6 +75,16 @@ def test_a_motion_of_two_periods_has_one_name(make_model: Callable[..., Model]) 
 
 
 @pytest.mark.long
+def test_a_chaotic_motion_has_one_name(make_model: Callable[..., Model]) -> None:
+    """Its states say nothing: the exponent of readings behind them does, as in a bifurcation diagram."""
+    model = make_model("punching_press_tangent")
+    given = {"bearing.pitch_diameter": 31.75e-3, "bearing.clearance": 30e-6}
+    found = model.section(parameters=given)
+    diagram = model.bifurcation("bearing.clearance=29.99 um:30 um:2", parameters=given, readings=40, settling=10)
+    assert found.motion == diagram.up[-1].kind == "chaotic"
+
+
+@pytest.mark.long
 def test_chaotic_points_are_on_no_curve_at_any_load(press: Model) -> None:
     for angle in (0.0, 270.0):
         found = press.section(at=angle, readings=200, parameters={"bearing.clearance": 40e-6})

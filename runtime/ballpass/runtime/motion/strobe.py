@@ -17,6 +17,7 @@ import numpy as np
 
 from ballpass.runtime.ask.kept_parts import KeptParts
 from ballpass.runtime.ask.parameter_range import ParameterRange
+from ballpass.runtime.contract.defaults import EXPONENT_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.motion.forcing_period import (
     ForcingPeriod,
@@ -25,10 +26,19 @@ from ballpass.runtime.motion.forcing_period import (
     phase_drifts,
     sampled_turns,
 )
-from ballpass.runtime.motion.lyapunov import REPEATED, changes_after, common_round, period_of
+from ballpass.runtime.motion.lyapunov import (
+    REPEATED,
+    changes_after,
+    common_round,
+    kind_of_motion,
+    largest_exponent,
+    period_of,
+    strobe_with_tangents,
+)
 from ballpass.runtime.motion.shooting import Shooting
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.ratings.of_bearing import bearing_words
+from ballpass.runtime.request.locating import jumping_laws
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
 
@@ -106,23 +116,51 @@ class Strobe:
         return None
 
     def name_of(
-        self, model: LoadedModel, parameters: Mapping[str, float], run: Solution, begin: float, *, follows: bool
+        self,
+        model: LoadedModel,
+        parameters: Mapping[str, float],
+        run: Solution,
+        begin: float,
+        rtol: float | None,
+        *,
+        follows: bool,
     ) -> str:
         """Name of the motion of a run that `sample_times` are among the times of, as `kind_of_motion` gives it.
+
+        Where its states do not tell, `READ` more readings give the exponent.
 
         Parameters
         ----------
         begin : from which time on readings count [s]
-        follows : whether the state at an angle is a function of where the balls stand
+        rtol : of the tangents; None: as `bifurcation` takes it
+        follows : whether the state at an angle is a function of where the balls stand; no exponent is asked for then
         """
-        if self.period is None:
-            rounds = common_round(self.drifts(model, parameters))
-            return "undecided" if not follows else f"periodic {rounds}" if rounds else "quasi-periodic"
-        times = self.sample_times(model, parameters, begin, float(run.t[-1]))
-        states, magnitude = run.x[np.searchsorted(run.t, times)], np.array(run.statistics.magnitudes)
-        found = self.settled(model, parameters, states, magnitude, KeptParts(None, ())) if model.has_stepper else None
-        repeats = found[0] if found is not None else period_of(states, magnitude)
-        return f"periodic {repeats}" if repeats else "undecided"
+        drifts, magnitude = self.drifts(model, parameters), np.array(run.statistics.magnitudes)
+        if self.period is None and follows:
+            rounds = common_round(drifts)
+            return f"periodic {rounds}" if rounds else "quasi-periodic"
+        if self.period is not None:
+            states = run.x[np.searchsorted(run.t, self.sample_times(model, parameters, begin, float(run.t[-1])))]
+            found = (
+                self.settled(model, parameters, states, magnitude, KeptParts(None, ())) if model.has_stepper else None
+            )
+            repeats = found[0] if found is not None else period_of(states, magnitude)
+            if repeats:
+                return f"periodic {repeats}"
+        if not model.has_stepper or jumping_laws(model.manifest):
+            return "undecided"
+        states, flows = strobe_with_tangents(
+            model,
+            model.numbers(parameters),
+            run.end,
+            self.time(model, parameters),
+            READ,
+            magnitude,
+            EXPONENT_RTOL if rtol is None else rtol,
+            lambda: None,
+        )
+        grown = largest_exponent(flows, states, magnitude, drifts)
+        return kind_of_motion(states, magnitude, grown, drifts, forced=self.period is not None)[0]
 
     def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
         """Times between two others at which states are read, the last `READ` of them [s]."""

@@ -179,8 +179,8 @@ class PoincareSection(ShortRepr, Reported):
             )
         elif self.kind == "on no smooth curve":
             parts.append(
-                "The motion is chaotic, not settled, or its curve is finer than these points resolve. Take more points "
-                "or another angle (at); the Lyapunov exponent of ballpass bifurcation says whether it is chaotic."
+                "The motion is chaotic, not settled, or its curve is finer than these points resolve: its name is that "
+                "of its Lyapunov exponent. Take more points or another angle (at)."
             )
         facts = {
             **self._named("angle", "turns", "around", "others", "kind", "period", "motion", "every"),
@@ -299,6 +299,6 @@ def section(
         period=period,
         curve=curve,
         others=others,
-        motion=strobe.name_of(model, given, run, begin, follows=follows),
+        motion=strobe.name_of(model, given, run, begin, rtol, follows=follows),
         every=strobe.every,
     )
