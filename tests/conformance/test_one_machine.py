@@ -23,7 +23,7 @@ from ballpass.runtime.questions.question import declared
 NOT_YET: tuple[tuple[str, str], ...] = (
     (
         r"table and the same twice over two turns, motor: (explain|figures)",
-        "where a torque drives a table is no input, and `cycle_turns` takes its turns as declared",
+        "where a torque drives a table is no input, and `Repetition` takes its turns as declared",
     ),
     (
         r"unbalance and harmonic load, shaft: steady",

@@ -81,7 +81,7 @@ def test_phases_after_100_000_turns(press: Press, holds: Holds) -> None:
     numbers = model.numbers({START: 1.0, BALL: 0.3})
     worst = 0.0
     for k in (100_000, 99_999, 33_333):
-        t = k * timeline.period(model.manifest, numbers.values)
+        t = k * timeline.driver(model.manifest, numbers.values).turn
         found = timeline.inputs_at(model.manifest, numbers.values, t)
         for info, value in zip(model.manifest.inputs, found, strict=True):
             if info.kind == "phase":
@@ -132,7 +132,7 @@ def test_late_motion_equals_a_fresh_start(press: Press, holds: Holds, turns: int
     heavy = {RATIO: HEAVY * model.parameters[RATIO]}
     late = model.reduce(cycles=turns, transient=0, parameters=heavy, rtol=1e-6)
     numbers = model.numbers(heavy)
-    t = (turns - fresh) * timeline.period(model.manifest, numbers.values)
+    t = (turns - fresh) * timeline.driver(model.manifest, numbers.values).turn
     angle = float(exact_phase(0.0, numbers.values[SPEED], t, cage_ratio(numbers.parameters)))
     again = model.reduce(cycles=fresh, transient=0, parameters={**heavy, BALL: angle}, rtol=1e-6)
     size = max(again["inner.y"].range, again["inner.x"].range)

@@ -11,7 +11,7 @@ import pytest
 from ballpass.runtime import Model
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point.jacobian import quantity_values
-from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints
 
 DEGREE = math.pi / 180.0
 ANGLES, FORCES = [-20.0, 30.0, 130.0, 190.0, 250.0], [0.0, 1200.0, 1700.0, 900.0, -60.0]
@@ -81,7 +81,7 @@ def test_derivatives_by_knots_are_those_of_linear_interpolation(shaper: Model, c
 
 def test_steps_end_at_the_knots_and_a_turn_has_each_of_them(shaper: Model) -> None:
     speed = shaper.parameters[SPEED]
-    times = timeline.breakpoints(shaper.manifest, shaper.numbers().values, 0.0, 1.0)
+    times = breakpoints(shaper.manifest, shaper.numbers().values, 0.0, 1.0)
     expected = sorted(((a % 360.0) + 360.0 * turn) * DEGREE / speed for a in ANGLES for turn in range(2))
     np.testing.assert_allclose(times, [t for t in expected if 0.0 < t < 1.0], rtol=1e-14)
 

@@ -10,7 +10,7 @@ import pytest
 
 from ballpass.runtime import Model
 from ballpass.runtime.app.transient_words import warnings_of_transient
-from ballpass.runtime.request.beats import beats
+from ballpass.runtime.time.repetition import Repetition
 
 PUSH = """[loads.push]
 type = "harmonic"
@@ -32,11 +32,13 @@ def rotor(make_model: Callable[..., Model]) -> Model:
 def test_beats_are_those_of_rates_that_nearly_match(rotor: Model) -> None:
     def slowest(frequency: float) -> tuple[float, str]:
         values = rotor.numbers({FREQUENCY: frequency}).values
-        return max((beat.period, beat.words) for beat in beats(rotor.manifest, values))
+        return max((beat.period, beat.words) for beat in Repetition.of(rotor.manifest, values).beats())
 
     assert slowest(50.1) == (pytest.approx(10.0), "load push with the shaft")
     assert slowest(25.05) == (pytest.approx(10.0), "load push with the shaft")  # 50.1 against 50
-    passing = next(b.period for b in beats(rotor.manifest, rotor.numbers().values) if b.words.startswith("balls"))
+    passing = next(
+        b.period for b in Repetition.of(rotor.manifest, rotor.numbers().values).beats() if b.words.startswith("balls")
+    )
     assert slowest(50.0) == (pytest.approx(passing), "balls passing the outer ring with the shaft")  # locked
 
 

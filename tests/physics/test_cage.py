@@ -12,6 +12,7 @@ from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import edge_times
 
 TIMES, SLIPS = np.array([0.0, 0.02, 0.05, 0.06]), np.array([0.0, 0.3, -0.1, 0.05])
 TABLES = f"""[bearing.cage]
@@ -60,7 +61,7 @@ def test_spalls_are_met_where_the_slipping_cage_brings_them(slipping: Model) -> 
     """Edges of the windows against the angle at their times: half the chord before and behind the spall."""
     values = {**slipping.parameters, **slipping.constants()}
     gates = [item for item in slipping.manifest.inputs if item.kind == "gate"]
-    passed = [t for gate in gates for _, t in timeline.edge_times(slipping.manifest, gate, values, 0.0, 0.15)]
+    passed = [t for gate in gates for _, t in edge_times(slipping.manifest, gate, values, 0.0, 0.15)]
     edges = np.unique(np.concatenate(passed))
     assert len(edges) >= 8
     half = slipping.constants()["bearing.defects.spall.half_angle"]

@@ -15,7 +15,7 @@ from ballpass.runtime import Model
 from ballpass.runtime.app.transient_words import warnings_of_transient
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.solution.settle import LEAST
-from ballpass.runtime.time.timeline import whole_cycles
+from ballpass.runtime.time.repetition import Repetition
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 WINDOW = 'window = { start = "237 deg", end = "267 deg" }'
@@ -105,7 +105,7 @@ def test_means_without_asking_are_those_of_whole_cycles(make_model: Callable[...
 def test_loads_of_any_drive_repeat_after_the_turns_of_a_table(make_virtual: Callable[..., Model], scene: str) -> None:
     """A motor's angle is a state: its settled runs and lives were 64 turns, no multiple of three."""
     model = make_virtual(scene, *table(ANGLES, FORCES, ", turns = 3"))
-    assert (model.explain().turns, whole_cycles(model.manifest, model.numbers().values, LEAST)) == (3, 66)
+    assert (model.explain().turns, Repetition.of(model.manifest, model.numbers().values).whole(LEAST)) == (3, 66)
 
 
 def test_angles_beyond_the_turns_are_refused(scene_text: Callable[..., str]) -> None:

@@ -16,6 +16,8 @@ from hypothesis import strategies as st
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import InputInfo, TurningInfo
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoint_slopes, breakpoints
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, Turning
 
 TURN = 2.0 * math.pi
@@ -44,13 +46,13 @@ def gate(values: dict[str, float], t: float) -> float:
 def test_punch_window_switches_at_its_angles_in_every_turn() -> None:
     values = window(237, 267)
     expected = [(k + angle / 360.0) for k in range(3) for angle in (237, 267)]
-    np.testing.assert_allclose(timeline.breakpoints(of(GATE), values, 0.0, 3.0), expected, rtol=1e-15)
+    np.testing.assert_allclose(breakpoints(of(GATE), values, 0.0, 3.0), expected, rtol=1e-15)
     assert [gate(values, t / 360.0) for t in (236.999, 237.001, 266.999, 267.001)] == [0.0, 1.0, 1.0, 0.0]
 
 
 def test_start_belongs_to_the_window_and_end_does_not_even_when_rounding_hits_them() -> None:
     values = window(237, 267, speed=500.0 * TURN / 60.0, offset=0.1)
-    edges = timeline.breakpoints(of(GATE), values, 0.0, 120.0)
+    edges = breakpoints(of(GATE), values, 0.0, 120.0)
     assert len(edges) == 2 * 1000
     inside = [gate(values, t) for t in edges]
     assert inside == [1.0, 0.0] * 1000
@@ -59,32 +61,32 @@ def test_start_belongs_to_the_window_and_end_does_not_even_when_rounding_hits_th
 def test_window_across_zero_is_one_window() -> None:
     values = window(330, 30)
     assert [gate(values, a / 360.0) for a in (0, 29, 31, 180, 329, 331, 359, 361)] == [1, 1, 0, 0, 0, 1, 1, 1]
-    np.testing.assert_allclose(timeline.breakpoints(of(GATE), values, 0.0, 1.0), [30 / 360, 330 / 360], rtol=1e-15)
+    np.testing.assert_allclose(breakpoints(of(GATE), values, 0.0, 1.0), [30 / 360, 330 / 360], rtol=1e-15)
 
 
 @pytest.mark.parametrize(("start", "end", "value"), [(40, 40, 0.0), (0, 360, 1.0), (90, 450, 1.0), (10, 800, 1.0)])
 def test_windows_of_zero_width_never_act_and_of_a_turn_or_more_always(start: float, end: float, value: float) -> None:
     values = window(start, end)
     assert [gate(values, t) for t in np.linspace(0.0, 2.0, 97)] == [value] * 97
-    assert timeline.breakpoints(of(GATE), values, 0.0, 5.0).size == 0
+    assert breakpoints(of(GATE), values, 0.0, 5.0).size == 0
 
 
 def test_backward_driver_meets_the_end_first() -> None:
     values = window(237, 267, speed=-TURN)
-    np.testing.assert_allclose(timeline.breakpoints(of(GATE), values, 0.0, 1.0), [93 / 360, 123 / 360], rtol=1e-14)
+    np.testing.assert_allclose(breakpoints(of(GATE), values, 0.0, 1.0), [93 / 360, 123 / 360], rtol=1e-14)
     assert [gate(values, t / 360.0) for t in (92, 94, 122, 124)] == [0.0, 1.0, 1.0, 0.0]
 
 
 def test_standing_driver_holds_its_gate() -> None:
     values = window(237, 267, speed=0.0, offset=math.radians(240))
     assert gate(values, 1e6) == 1.0
-    assert timeline.breakpoints(of(GATE), values, 0.0, 1e6).size == 0
+    assert breakpoints(of(GATE), values, 0.0, 1e6).size == 0
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.0, 1e300), (-1.7e308, 1.7e308), (0.0, 1e9)])
 def test_more_turns_than_can_be_listed_are_refused(begin: float, end: float) -> None:
     with pytest.raises(RequestError, match="too many to list what switches"):
-        timeline.breakpoints(of(GATE), window(237, 267), begin, end)
+        breakpoints(of(GATE), window(237, 267), begin, end)
 
 
 @settings(max_examples=100, deadline=None)
@@ -100,7 +102,7 @@ def test_gate_changes_at_every_breakpoint_and_nowhere_else(
 ) -> None:
     values = window(start, start + width, speed=sign * speed, offset=offset)
     t1 = 2.3 * TURN / speed
-    edges = timeline.breakpoints(of(GATE), values, 0.0, t1)
+    edges = breakpoints(of(GATE), values, 0.0, t1)
     bounds = np.concatenate([[0.0], edges, [t1]])
     # edges nearer than the clock's resolution are one edge: leave out starts and ends that all but meet one
     assume(np.min(np.diff(bounds)) * speed > 1e4 * ANGLE_RESOLUTION)
@@ -123,7 +125,7 @@ def test_table_is_linear_between_its_knots_and_constant_outside() -> None:
     np.testing.assert_allclose(found, np.interp(times, [1, 2, 4], [10, 20, 0]), rtol=1e-15)
     slopes = [timeline.inputs_at(of(SLOPE), KNOTS, t)[0] for t in times]
     assert slopes == [0.0, 10.0, 10.0, -10.0, -10.0, 0.0, 0.0]
-    np.testing.assert_array_equal(timeline.breakpoints(of(TABLE, SLOPE), KNOTS, 0.0, 9.0), [1.0, 2.0, 4.0])
+    np.testing.assert_array_equal(breakpoints(of(TABLE, SLOPE), KNOTS, 0.0, 9.0), [1.0, 2.0, 4.0])
 
 
 def test_slope_is_that_of_the_interval_while_the_value_is_that_of_the_reference_time() -> None:
@@ -182,12 +184,12 @@ def test_input_derivatives_equal_differences(t: float) -> None:
 def test_the_time_of_an_edge_moves_as_differences_say(t: float) -> None:
     values = {**window(0, 40), **SPEEDS, **LAGS}
     manifest = of(GATE, turning=ROWS)
-    at = float(np.min(edges[edges > t])) if len(edges := timeline.breakpoints(manifest, values, 0.0, 4.0)) else math.nan
+    at = float(np.min(edges[edges > t])) if len(edges := breakpoints(manifest, values, 0.0, 4.0)) else math.nan
     for name in (*SPEEDS, *LAGS, "start", "w.start", "w.end"):
-        _, slopes = timeline.breakpoint_slopes(manifest, values, [{name: 1.0}], at)
+        _, slopes = breakpoint_slopes(manifest, values, [{name: 1.0}], at)
 
         def moved(change: float, name: str = name) -> float:
-            times = timeline.breakpoints(manifest, {**values, name: values[name] + change}, 0.0, 4.0)
+            times = breakpoints(manifest, {**values, name: values[name] + change}, 0.0, 4.0)
             return float(times[np.argmin(np.abs(times - at))])
 
         assert slopes[0, 0] == pytest.approx((moved(1e-7) - moved(-1e-7)) / 2e-7, rel=1e-5, abs=1e-7), name
@@ -242,8 +244,8 @@ def test_the_last_pass_before_the_end_is_the_last_of_all(rate: float, end: float
 def test_rows_of_equal_value_are_no_rows() -> None:
     values = {**SPEEDS, **LAGS, "start": 0.0, "speed": 3.0, **dict.fromkeys(("v1", "v2", "v3", "v4"), 3.0)}
     manifest = of(PHASE, turning=replace(ROWS, lag_times=(), lags=(), lag="", rolling=""))
-    assert timeline.settled_after(manifest, values) == -math.inf
-    assert timeline.settled_after(manifest, {**values, "v2": 4.0}) == SPEEDS["s3"]
-    assert not timeline.changes_over_time(manifest, values, 0.0, 9.0)
-    assert timeline.changes_over_time(manifest, {**values, "v2": 4.0}, 1.3, 1.4)
-    assert not timeline.changes_over_time(manifest, {**values, "v2": 4.0}, 2.2, 9.0)
+    even, changing = (Repetition.of(manifest, one) for one in (values, {**values, "v2": 4.0}))
+    assert (even.settled_after, changing.settled_after) == (-math.inf, SPEEDS["s3"])
+    assert not even.changing(0.0, 9.0)
+    assert changing.changing(1.3, 1.4)
+    assert not changing.changing(2.2, 9.0)

@@ -21,7 +21,7 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.certify.simplification import measure_simplification
 from ballpass.runtime.certify.trade import REFERENCE, measure_trade
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.time.timeline import period
+from ballpass.runtime.time.timeline import driver
 
 #: How kinds are asked for that take no state, or want a place.
 NAMES = {
@@ -103,7 +103,7 @@ def test_commands_and_data_sets_give_that_value(
     signals = Signals(outputs=("inner.y",), sample_rate=10e3, duration=0.2, transient=0.06, rtol=1e-9, quantities=names)
     length = {
         "duration": float(signals.times[-1]),
-        "transient": signals.transient / period(model.manifest, model.numbers().values),
+        "transient": signals.transient / driver(model.manifest, model.numbers().values).turn,
     }
     expected = {name: one.value for name, one in model.quantities(names, rtol=1e-9, **length).items()}
     asked = ["--rtol=1e-9", f"--duration={length['duration']!r} s", f"--transient={length['transient']!r}"]

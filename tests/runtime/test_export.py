@@ -408,7 +408,7 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
     program = exported(scene, *changes)
     model = program.model
     inputs, resolved = model.manifest.inputs, model.numbers(numbers)
-    turn = timeline.period(model.manifest, resolved.values)
+    turn = timeline.driver(model.manifest, resolved.values).turn
     edges = segment_edges(model, resolved, 0.0, length, turn)
     angles = [resolved.values[info.offset] for info in model.manifest.turnings]
     values = np.concatenate([resolved.p, resolved.c, angles, [np.nan, 0.0, 0.0]])

@@ -33,6 +33,7 @@ from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.export.fmu import export_fmu, input_names, platform_tuple
 from ballpass.runtime.export.model_description import base_powers
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints
 
 fmpy = pytest.importorskip("fmpy", reason="needs FMPy: pip install ballpass[dev]")
 fmi3 = pytest.importorskip("fmpy.fmi3")
@@ -351,7 +352,7 @@ def test_derivatives_are_those_of_differences(exported: Callable[..., Exported])
 
         def values(numbers: dict[str, float], state: np.ndarray) -> np.ndarray:
             resolved = model.numbers(numbers)
-            edges = timeline.breakpoints(manifest, resolved.values, 0.0, 0.0831)
+            edges = breakpoints(manifest, resolved.values, 0.0, 0.0831)
             start = float(edges[-1])
             u = timeline.inputs_at(manifest, resolved.values, start, 0.083)
             there = {"t": 0.0831 - start, "x": state, "u": u, "p": resolved.p, "c": resolved.c}

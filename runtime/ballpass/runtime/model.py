@@ -40,9 +40,10 @@ from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.solution.sensitivity import Sensitivities, sensitivities
-from ballpass.runtime.solution.settle import MOST, Settled, settle
+from ballpass.runtime.solution.settle import Settled, settle
 from ballpass.runtime.solution.simulate import simulate
 from ballpass.runtime.solution.stream import stream_run
+from ballpass.runtime.time.repetition import MOST_RUN
 
 if TYPE_CHECKING:
     from ballpass.runtime.solution.solution import Solution, Statistics
@@ -496,7 +497,7 @@ class Model(PointModel, Questions):
         rtol: float | None = None,
         initial: Initial = None,
         kinks: Kinks | None = None,
-        most: int = MOST,
+        most: int = MOST_RUN,
         progress: Progress = None,
     ) -> Settled:
         """Reduce a run of as many turns as its extremes and rms take to settle (`solution/settle.py`).

@@ -15,7 +15,6 @@ import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
@@ -50,6 +49,7 @@ from ballpass.derive.terms import Names, names_of
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.defaults import STEADY_CYCLES
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.time.repetition import LOCKED, near_fraction
 
 T = TypeVar("T", Bearing, Load)
 
@@ -313,8 +313,8 @@ def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Seq
                 math.tau * law.frequency.value / abs(shaft.speed.value) if isinstance(law, HarmonicLoad) else math.nan
             )
             if math.isfinite(ratio):  # a number with a fault has none
-                near = Fraction(ratio).limit_denominator(MOST_TURNS)
-                counts += [near.denominator] if math.isclose(near, ratio, rel_tol=1e-9) else []
+                near = near_fraction(ratio, MOST_TURNS, LOCKED)
+                counts += [] if near is None else [near.denominator]
     return math.lcm(1, *counts)
 
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from ballpass.runtime.quantity.characteristic import turns_to_separate
-from ballpass.runtime.solution.settle import repeats
-from ballpass.runtime.time.timeline import driver
+from ballpass.runtime.time.repetition import Repetition
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -41,8 +40,8 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         return None
     done = (solution.t[-1] - statistics.begin) / length
     numbers = {**solution.parameters, **solution.constants}
-    turning = driver(model.manifest, numbers)
-    if not repeats(model, numbers, turning.after(solution.transient_cycles)):
+    repetition = Repetition.of(model.manifest, numbers)
+    if not repetition.holds(repetition.driver.after(solution.transient_cycles)):
         return None
     turns = turns_to_separate(solution.manifest, numbers)
     if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
@@ -57,5 +56,5 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
         kinks=cast("Kinks | None", statistics.kinks),
         outputs=[name for name in wanted if name not in solution.states],
         initial=solution.end,
-        transient=turning.turns(0.0, float(solution.t[-1])) + SETTLE,
+        transient=repetition.driver.turns(0.0, float(solution.t[-1])) + SETTLE,
     )

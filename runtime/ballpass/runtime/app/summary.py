@@ -41,7 +41,7 @@ from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.failure_location import ring_distances
 from ballpass.runtime.solution.settle import MEANS, PEAKS
-from ballpass.runtime.time.timeline import cycle_turns
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
@@ -277,7 +277,7 @@ def _drive_work(model: Model, sol: Solution) -> float | None:
     if mechanism is None or mechanism.angle:
         return None
     run = run_of(model, numbers, sol)
-    window = whole_cycles(run.span, cycle_turns(sol.manifest, numbers.values))
+    window = whole_cycles(run.span, Repetition.of(sol.manifest, numbers.values).turns)
     if window is None:
         return None
     if has_quantities(sol, "drive_torque", model):

@@ -15,13 +15,13 @@ from ballpass.runtime.certify.transient import remembered, still_changes
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.quantity.grammar import channels_of
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.request.beats import beats
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
-from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced, repeats, tolerated
-from ballpass.runtime.time import timeline
-from ballpass.runtime.time.timeline import cycle_turns
+from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced, tolerated
+from ballpass.runtime.time.breakpoints import rows_over_time
+from ballpass.runtime.time.repetition import Repetition
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -54,13 +54,13 @@ def warnings_of_transient(
 
 def tables_left_out(model: Model, values: Mapping[str, float]) -> list[str]:
     """A sentence where turns that a scene without a run takes lie behind rows of tables, or are no load's period."""
-    settings, turning = model.run_settings, timeline.driver(model.manifest, values)
+    settings, repetition = model.run_settings, Repetition.of(model.manifest, values)
+    turning = repetition.driver
     if settings.stated or settings.cycles is None or turning.fastest == 0.0:
         return []
     begin, end = turning.after(settings.transient_cycles), turning.after(settings.cycles)
-    changes = timeline.changes_over_time(model.manifest, values, 0.0, begin)
-    rows = timeline.rows_over_time(model.manifest, values, 0.0, begin if changes else 0.0)
-    slowest, length = timeline.longest_harmonic(model.manifest, values), end - begin
+    rows = rows_over_time(model.manifest, values, 0.0, begin if repetition.changing(0.0, begin) else 0.0)
+    slowest, length = repetition.slowest_load, end - begin
     if not len(rows) and slowest > length * (1.0 + 1e-9):
         return [
             f"turns {settings.transient_cycles:g} to {settings.cycles:g}, which a scene without a run takes, are "
@@ -113,7 +113,7 @@ def transient_words(model: Model, run: Run, longer: Settled | None, *, asked: bo
 
 def _part_of_cycle(run: Run) -> list[str]:
     """A warning about means of a run that ends within the turns after which all loads repeat."""
-    cycle, turns = cycle_turns(run.model.manifest, run.numbers.values), run.span.counted
+    cycle, turns = Repetition.of(run.model.manifest, run.numbers.values).turns, run.span.counted
     if cycle == 1 or math.isclose(turns, cycle * round(turns / cycle), rel_tol=1e-9):
         return []
     return [
@@ -133,20 +133,22 @@ def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
     model, values, words = run.model, run.numbers.values, []
     turns = max(run.span.counted, 0.0 if longer is None else longer.turns)
     turn = run.span.turning.turn
-    slow = [one for one in beats(model.manifest, values) if one.period > turns * turn]
-    if not slow or not repeats(model, values, run.start):
+    repetition = Repetition.of(model.manifest, values)
+    slow = [one for one in repetition.beats() if one.period > turns * turn]
+    if not slow or not repetition.holds(run.start):
         return []
     here, noise = reduced(run), tolerated(run)
     for beat in slow:
-        there = reduced(replace(run, numbers=model.numbers({**run.numbers.parameters, **beat.half})))
+        half = {name: values[name] + step for name, step in beat.half.items()}
+        there = reduced(replace(run, numbers=model.numbers({**run.numbers.parameters, **half})))
         changes = changed(here, there, noise)
         name = max(changes, key=lambda one: max(changes[one][0] / PEAKS, changes[one][1] / MEANS))
         peak, mean = changes[name]
         if peak <= PEAKS and mean <= MEANS:
             continue
-        needed = math.ceil(beat.period / turn)
+        needed, what = math.ceil(beat.period / turn), bearing_words(beat.words, model.manifest.bearings)
         words.append(
-            f"{beat.words} beats once in {beat.period:.4g} s, {rounded(beat.period / turn)} turns, of which the "
+            f"{what} beats once in {beat.period:.4g} s, {rounded(beat.period / turn)} turns, of which the "
             f"run has {turns:g}: half a beat later extremes of {name} change by {rounded(100.0 * peak, 2)} % of their "
             f"range and its rms by {rounded(100.0 * mean, 2)} %. Numbers are those of a part of the beat; all of it "
             f"takes --cycles {math.ceil(run.span.transient) + needed} --transient {run.span.transient:g}."

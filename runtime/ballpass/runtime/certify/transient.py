@@ -18,8 +18,7 @@ from ballpass.runtime.contract.manifest import RunInfo
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
-from ballpass.runtime.solution.settle import repeats
-from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition
 
 #: How far the rings are moved at the start, in their magnitudes [1]: what a start at rest is off by.
 MOVED = 0.1
@@ -41,9 +40,8 @@ def find_transient(model: LoadedModel) -> RunInfo:
     numbers = model.numbers()
     if given.cycles is None or not (model.has_stepper and model.states):
         return given
-    if not repeats(
-        model, numbers.values, timeline.driver(model.manifest, numbers.values).after(given.transient_cycles)
-    ):
+    repetition = Repetition.of(model.manifest, numbers.values)
+    if not repetition.holds(repetition.driver.after(given.transient_cycles)):
         return given
     transient, length, left = given.transient_cycles, given.cycles - given.transient_cycles, SEARCH
     try:

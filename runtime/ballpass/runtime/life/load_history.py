@@ -20,13 +20,13 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, TURNED, reduction_rows
 from ballpass.runtime.ratings.life import raceway_life
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
-from ballpass.runtime.request.beats import slowest_beat
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, raceway_powers, reduction_of
-from ballpass.runtime.solution.settle import LEAST, MOST, PEAKS, repeats
+from ballpass.runtime.solution.settle import LEAST, PEAKS
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import MOST_RUN, Repetition
 from ballpass.runtime.time.turning import TURN
 
 #: Relative change of a life that counts as zero [1].
@@ -72,17 +72,16 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         The computation failed.
     """
     manifest = model.manifest
-    turn = timeline.period(manifest, numbers.values)
+    repetition = Repetition.of(manifest, numbers.values)
+    turn = repetition.turn
     span = asked_span(model, numbers, request)
     given = request.cycles is not None or request.duration is not None
-    doubles = not given and repeats(model, numbers.values, span.start)
-    turns: float = timeline.whole_cycles(manifest, numbers.values, LEAST)
-    slowest = timeline.longest_harmonic(manifest, numbers.values) / turn
-    beat = slowest_beat(manifest, numbers.values, MOST // 2 * turn) / turn
-    turns = max(turns, timeline.whole_cycles(manifest, numbers.values, math.ceil(beat)))
+    doubles = not given and repetition.holds(span.start)
+    slowest, beat = repetition.slowest_load / turn, repetition.slowest_beat(MOST_RUN // 2 * turn) / turn
+    turns: float = repetition.whole(max(LEAST, beat))
     if slowest > 1.0:  # whole periods of the load, as far as there are turns
         turns = slowest * math.ceil(turns / slowest)
-    covered, turns = 2 * turns <= MOST, min(turns, MOST // 2)
+    covered, turns = 2 * turns <= MOST_RUN, min(turns, MOST_RUN // 2)
     run = resolve(model, numbers, request, span=span.counting(turns) if doubles else span)
     going = start_reducing(run, _channels(model))
     start, end = going.run.start, going.run.end
@@ -97,7 +96,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         turns *= 2
         going.go_on(start + turns * turn)
         found = _compared(going, before)
-        if found.settled or 2 * turns > MOST:
+        if found.settled or 2 * turns > MOST_RUN:
             return replace(found, settled=found.settled and covered)
         before = found
 

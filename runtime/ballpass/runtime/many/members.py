@@ -19,6 +19,7 @@ from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
 
 Table = Mapping[str, object] | Sequence[Mapping[str, float]] | np.ndarray
@@ -187,7 +188,7 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
     for member in np.flatnonzero(wrong).tolist():
         values = {name: float(columns[name][member]) for name in timeline.names_of_inputs(manifest)}
         try:
-            timeline.breakpoints(manifest, values, 0.0, 1.0)
+            breakpoints(manifest, values, 0.0, 1.0)
         except RequestError as fault:
             refused[member] = str(fault)
 

@@ -13,6 +13,7 @@ from ballpass.runtime.contract.manifest import InputInfo, Manifest
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import edge_times
 from ballpass.runtime.time.turning import Turning
 
 #: Names of the inputs of spalls.
@@ -72,7 +73,7 @@ def _entries(manifest: Manifest, item: InputInfo, values: Mapping[str, float], b
     """Times from `begin` to before `end` at which a window opens, increasing [s]."""
     info = timeline.info_of(manifest, item)
     times = []
-    for name, passed in timeline.edge_times(manifest, item, values, begin, end):
+    for name, passed in edge_times(manifest, item, values, begin, end):
         # the edge that opens it is the first where the angle grows there
         opening = {first: 1.0 for first, _ in item.windows} | {last: -1.0 for _, last in item.windows}
         times.append(passed[np.sign(Turning.of(info, values).at(passed)[1]) == opening[name]])

@@ -28,10 +28,8 @@ from ballpass.runtime.request.request import Request
 from ballpass.runtime.solution.simulate import simulate
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import EXACT, LARGEST_DENOMINATOR, Repetition, near_fraction
 from ballpass.runtime.time.turning import STEP, TURN, Turning
-
-#: Two rates are commensurable where a fraction with at most this denominator meets their ratio so closely [1].
-LARGEST_DENOMINATOR, EXACT = 2000, 1e-11
 
 #: Accelerations at one state a period apart, relative to the largest, that are the same [1].
 SAME = 1e-6
@@ -97,8 +95,9 @@ def sampled_turns(model: LoadedModel, parameters: Mapping[str, float], turns: fl
     """A run from the scene's start over so many turns that are alike, or a second where nothing turns, sampled at
     `MOMENTS` of them."""
     numbers = model.numbers(parameters)
-    turn, begin = timeline.period(model.manifest, numbers.values), timeline.alike_from(model.manifest, numbers.values)
-    end = begin + (turns * turn if math.isfinite(turn) else 1.0)
+    repetition = Repetition.of(model.manifest, numbers.values)
+    begin = repetition.alike_from
+    end = begin + (turns * repetition.turn if math.isfinite(repetition.turn) else 1.0)
     times = np.linspace(begin, end, MOMENTS)
     return simulate(model, numbers, Request(duration=end, times=times, outputs=[], transient_cycles=0.0))
 
@@ -124,25 +123,25 @@ def forcing_period(
             raise RequestError("turns: nothing turns in this scene. Leave it away.")
         asked = ForcingPeriod(turning=driver, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
         return _checked(model, numbers, times, states, asked)
-    rates = _rates(model, numbers, times, states)
-    if not rates:
+    repetition = Repetition.of(model.manifest, numbers.values)
+    among = _that_matter(model, numbers, times, states, repetition)
+    if not among:
         raise RequestError(
             "steady: the equations do not change with time, so that they have no period. Look for a rest: "
             "ballpass linearize."
         )
-    (base, order), *others = rates.items()
-    speed = {info: abs(_rate(info, numbers.values)) for info in rates}
-    ratios = {info: float(speed[info] * n / (speed[base] * order)) for info, n in others}
-    near = {info: Fraction(ratio).limit_denominator(LARGEST_DENOMINATOR) for info, ratio in ratios.items()}
-    for info, ratio in ratios.items():
-        if abs(near[info] - ratio) > EXACT * ratio:
-            raise RequestError(_two_periods(base.rate, info.rate, float(ratio * order / rates[info])))
-    whole = math.lcm(*(one.denominator for one in near.values()))
+    base, period = among[0], dict[TurningInfo, Fraction]()
+    for info, turns_of_it in repetition.period(among).items():
+        if turns_of_it is None:
+            ratio = repetition.rates[info].speed / repetition.rates[base].speed
+            raise RequestError(_two_periods(base.rate, info.rate, ratio))
+        period[info] = turns_of_it
+    parts = [repetition.rates[info].parts for info in among]
     # one ball that differs, or rings whose shapes turn with the balls, need more than a ball pitch
-    for several in range(1, int(max(rates.values())) + 1):
-        count = whole * several / order
+    for several in range(1, int(max(parts)) + 1):
+        count = several * period[base]
         words = "; ".join(
-            _turned(info, count * (near[info] * order / n if info in near else 1), n) for info, n in rates.items()
+            _turned(info, several * period[info], alike) for info, alike in zip(among, parts, strict=True)
         )
         words = bearing_words(words, model.manifest.bearings)
         found = _checked(
@@ -197,12 +196,10 @@ def phase_drifts(
     ----------
     times, states : as for `forcing_period`
     """
-    found: dict[str, float] = {}
-    for info, alike in _rates(model, numbers, times, states).items():
-        rounds = abs(_rate(info, numbers.values)) * float(alike) * every / TURN
-        if abs(rounds - round(rounds)) > EXACT * rounds:
-            found[info.rate] = rounds % 1.0
-    return found
+    repetition = Repetition.of(model.manifest, numbers.values)
+    among = _that_matter(model, numbers, times, states, repetition)
+    rounds = {info.rate: repetition.rates[info].frequency * every for info in among}
+    return {rate: passed % 1.0 for rate, passed in rounds.items() if near_fraction(passed, 1, EXACT) is None}
 
 
 def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, every: float) -> list[str]:
@@ -211,20 +208,17 @@ def own_phases(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: 
     return [rate for rate in phase_drifts(model, numbers, times, states, every) if rate not in alike]
 
 
-def _rates(model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray) -> dict[TurningInfo, Fraction]:
-    """What turns that the equations depend on, driver or shaft first, and into how many like parts a turn of it falls:
-    a part of one where loads repeat after several."""
-    found: dict[TurningInfo, Fraction] = {}
+def _that_matter(
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, states: np.ndarray, repetition: Repetition
+) -> list[TurningInfo]:
+    """What turns that the equations depend on, driver or shaft first."""
+    found: dict[TurningInfo, None] = {}
     for k, item in enumerate(model.manifest.inputs):
-        if not item.turning or item.kind in ("angle", "rate", "slope"):
-            continue
-        info = timeline.info_of(model.manifest, item)
-        if _rate(info, numbers.values) != 0.0 and _matters(model, numbers, times, states, k, item):
-            turns = timeline.repeats_after(item, numbers.values) if item.turns > 1 else 1
-            parts = Fraction(1, turns) if turns > 1 else Fraction(info.parts)
-            known = found.get(info, parts)
-            found[info] = Fraction(1, math.lcm(known.denominator, turns)) if known.denominator * turns > 1 else known
-    return dict(sorted(found.items(), key=lambda one: one[0].kind != "driver"))
+        if item.turning and item.kind not in ("angle", "rate", "slope"):
+            info = timeline.info_of(model.manifest, item)
+            if info in repetition.rates and _matters(model, numbers, times, states, k, item):
+                found[info] = None
+    return sorted(found, key=lambda info: info.kind != "driver")
 
 
 def _matters(

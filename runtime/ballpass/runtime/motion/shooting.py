@@ -27,6 +27,7 @@ from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.solution.integration_error import IntegrationError
 from ballpass.runtime.solution.sensitivity import sensitivities
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition, alike_from_slope
 from ballpass.runtime.time.turning import TURN
 
 #: Most iterations, and halvings of a step that does not lessen what is left.
@@ -121,7 +122,7 @@ class Shooting:
 
     def begin(self, numbers: Numbers) -> float:
         """Time of the first state [s]: turns are alike from then on."""
-        return timeline.alike_from(self.model.manifest, numbers.values)
+        return Repetition.of(self.model.manifest, numbers.values).alike_from
 
     def residual(self, nodes: np.ndarray, value: float | None = None, rtol: float | None = None) -> Residual:
         """What a period leaves from these states at the segments' starts, shape (segments, states).
@@ -152,7 +153,7 @@ class Shooting:
         if self.over:  # where the period is a function of the parameter, so are the ends of all segments
             (moved,) = Chain(model, numbers, [self.over]).moved_numbers
             later = self.repeats * self.period.slope(numbers.values, moved)
-            first = timeline.alike_from_slope(model.manifest, numbers.values, moved)
+            first = alike_from_slope(model.manifest, numbers.values, moved)
         left = np.empty_like(nodes)
         by_parameter = np.zeros_like(nodes)
         by_states = np.zeros((self.segments, count, self.segments, count))

@@ -41,6 +41,7 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.request.locating import jumping_laws
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition
 
 #: Longest period of the equations that is taken between readings, in turns; else it is one turn.
 LONGEST_STROBE = 8.0
@@ -69,7 +70,7 @@ class Strobe:
     def time(self, model: LoadedModel, parameters: Mapping[str, float]) -> float:
         """Time between readings with these overrides [s]."""
         values = model.numbers(parameters).values
-        return timeline.period(model.manifest, values) if self.period is None else self.period.time(values)
+        return timeline.driver(model.manifest, values).turn if self.period is None else self.period.time(values)
 
     def drifts(self, model: LoadedModel, parameters: Mapping[str, float]) -> Collection[float]:
         """Parts of a round by which phases of the equations move from reading to reading."""
@@ -165,7 +166,7 @@ class Strobe:
     def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
         """Times between two others at which states are read, the last `READ` of them [s]."""
         step = self.time(model, parameters)
-        alike = timeline.alike_from(model.manifest, model.numbers(parameters).values)
+        alike = Repetition.of(model.manifest, model.numbers(parameters).values).alike_from
         first, last = math.ceil((begin - alike) / step), math.floor((end - alike) / step)
         return alike + step * np.arange(first, last + 1)[-READ:]
 
@@ -182,7 +183,7 @@ def strobe_of(
     """
     first = parameters if over is None else {**parameters, over.name: over.low}
     values = model.numbers(first).values
-    turn = timeline.period(model.manifest, values)
+    turn = timeline.driver(model.manifest, values).turn
     if not math.isfinite(turn):
         raise RequestError(f"{question}: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     try:

@@ -21,6 +21,7 @@ from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
 from ballpass.runtime.request.ball_angles import ball_angles, ball_angles_along
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
@@ -105,13 +106,13 @@ class Record:
     @property
     def cycle_turns(self) -> int:
         """Turns after which all loads repeat: two for a four-stroke engine."""
-        return timeline.cycle_turns(self.manifest, self._values)
+        return Repetition.of(self.manifest, self._values).turns
 
     @property
     def start_passed(self) -> float:
         """A time at which the driver stands at the angle of its start, while it turns evenly [s]."""
         turning = timeline.driver(self.manifest, self._values)
-        return turning.first_pass(float(turning.at(0.0)[0]), begin=float(turning.begin[-1])) or 0.0
+        return turning.first_pass(float(turning.at(0.0)[0]), begin=turning.even_from) or 0.0
 
     def last_turns(self, count: int) -> slice:
         """The last whole turns, at most `count`; the whole record where it holds none."""

@@ -33,6 +33,7 @@ from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.request.equilibrium_newton import FIRST_STEP, SearchEnd, settle
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.span import check_length
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, beside, past
 
@@ -276,8 +277,8 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
             f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
             f"to 4 pi; for degrees give math.radians({crank_angle!r})."
         )
-    turning = timeline.driver(model.manifest, numbers.values)
-    turns = timeline.cycle_turns(model.manifest, numbers.values)
+    repetition = Repetition.of(model.manifest, numbers.values)
+    turning, turns = repetition.driver, repetition.turns
     ahead = angle - timeline.crank_angle(model.manifest, numbers.values, 0.0)
     if turning.fastest == 0.0:
         if abs(beside(ahead)) < ANGLE_RESOLUTION:

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError
-from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, DRIVER_ACCELERATION
+from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP, DRIVER_ACCELERATION, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS
@@ -32,6 +32,8 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.request.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints, rows_over_time
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import past
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
@@ -204,11 +206,11 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     check_assembly(model, numbers)
     values = numbers.values
     manifest = model.manifest
-    turn = timeline.period(manifest, values)
-    turns = timeline.cycle_turns(model.manifest, values)
-    first = timeline.driver(manifest, values).after(turns)
+    repetition = Repetition.of(manifest, values)
+    turn, turns = repetition.turn, repetition.turns
+    first = repetition.driver.after(turns)
     span = first if math.isfinite(first) else (manifest.run.duration or 1.0)
-    length = max(span, _changing(model, values))
+    length = max(span, _changing(manifest, repetition))
     scales, unsupported = _time_scales(model, parameters, span, length) if model.states else ((), ())
     method, reason = _method(model, scales, turn)
     return Explanation(
@@ -242,22 +244,19 @@ def _places(breakpoints: Sequence[Breakpoint], repeats: float) -> str:
     return f"{len(breakpoints)} from {places[0]} to {places[-1]}: {loads} (each: --json)"
 
 
-def _changing(model: LoadedModel, values: Mapping[str, float]) -> float:
+def _changing(manifest: Manifest, repetition: Repetition) -> float:
     """Time over which loads change but with the turn [s]: with tables over time the run, else a harmonic's period."""
-    run = model.manifest.run
-    length = run.duration or timeline.driver(model.manifest, values).after(run.cycles or 0.0)
+    length = manifest.run.duration or repetition.driver.after(manifest.run.cycles or 0.0)
     length = length if math.isfinite(length) else 0.0
-    if timeline.changes_over_time(model.manifest, values, 0.0, length):
-        return length
-    return min(length, timeline.longest_harmonic(model.manifest, values))
+    return length if repetition.changing(0.0, length) else min(length, repetition.slowest_load)
 
 
 def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, length: float) -> tuple[Breakpoint, ...]:
     found = []
     manifest, inputs = model.manifest, model.manifest.inputs
     # a little over the turn's end, so that an edge at t = 0 counts once
-    times = timeline.breakpoints(manifest, values, -1e-9 * span, span * (1.0 - 1e-9))
-    timed = timeline.rows_over_time(manifest, values, span * (1.0 - 1e-9), length)
+    times = breakpoints(manifest, values, -1e-9 * span, span * (1.0 - 1e-9))
+    timed = rows_over_time(manifest, values, span * (1.0 - 1e-9), length)
     for time in [*times, *timed]:
         before = timeline.inputs_at(manifest, values, time, time - 1e-7 * span)
         behind = timeline.inputs_at(manifest, values, time, time + 1e-7 * span)
@@ -275,8 +274,8 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float, l
 
 def _angle(model: LoadedModel, values: Mapping[str, float], time: float) -> float:
     """Angle of driver or shaft within the turns after which loads repeat [rad]."""
-    turns = timeline.cycle_turns(model.manifest, values)
-    return float(past(timeline.driver(model.manifest, values).at(time)[0], turns=turns))
+    repetition = Repetition.of(model.manifest, values)
+    return float(past(repetition.driver.at(time)[0], turns=repetition.turns))
 
 
 def _knot(slope: str) -> str:
@@ -300,7 +299,7 @@ def _time_scales(
     even = (np.arange(INSTANTS) + 0.5) / INSTANTS
     times = even * span
     if length > span:
-        rows = timeline.rows_over_time(model.manifest, values, 0.0, length)
+        rows = rows_over_time(model.manifest, values, 0.0, length)
         times = np.concatenate([times, even * length, rows])
     # at the initial position, so that contact forces are those of t = 0 and only the load differs between instants
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}

@@ -19,6 +19,7 @@ from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.equilibrium import StaticEquilibrium
@@ -72,7 +73,7 @@ class PointModel(LoadedModel):
         >>> f"{model.period():.4g} s"
         '0.12 s'
         """
-        return timeline.period(self.manifest, self.numbers(parameters).values)
+        return timeline.driver(self.manifest, self.numbers(parameters).values).turn
 
     def breakpoints(self, t0: float, t1: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s].
@@ -84,7 +85,7 @@ class PointModel(LoadedModel):
         """
         if not -math.inf < real(t0) < real(t1) < math.inf:
             raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
-        return timeline.breakpoints(self.manifest, self.numbers(parameters).values, float(t0), float(t1))
+        return breakpoints(self.manifest, self.numbers(parameters).values, float(t0), float(t1))
 
     def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,).

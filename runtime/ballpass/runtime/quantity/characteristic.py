@@ -17,6 +17,7 @@ from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import LOCKED, Repetition, near_fraction
 from ballpass.runtime.time.turning import TURN
 
 #: Multiples that are looked for: of ball passes, of these with sidebands, of the cage (more are ball passes); and the
@@ -32,8 +33,6 @@ TURNS, APART, MOST = 100, 5.0, 400
 #: Names of what is of a bearing.
 OF_BEARINGS = ("FTF", "BPFO", "BPFI", "2 BSF")
 
-#: A harmonic load this close to a multiple of the shaft is one of its lines [1].
-LOCKED = 1e-9
 
 #: Speeds of the balls over both rings, behind the path of a bearing.
 PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
@@ -125,12 +124,12 @@ def characteristic_lines(
         return ()
     unit = speed if orders else 1.0
     shaft = speed / unit
-    parts = timeline.cycle_turns(manifest, values)
+    repetition = Repetition.of(manifest, values)
+    parts = repetition.turns
     found = [CharacteristicLine(name="shaft", bearing="", frequency=shaft, side=0.0, side_name="", parts=parts)]
-    for rate, (load, *_) in timeline.loads(manifest).items():
-        frequency = abs(values[rate]) / TURN / unit
-        order = frequency / shaft * parts
-        if abs(order - round(order)) < LOCKED:
+    for load in repetition.loads:
+        frequency = load.frequency / unit
+        if near_fraction(frequency / shaft * parts, 1, LOCKED):
             continue
         found.append(
             CharacteristicLine(name=load.words, bearing="", frequency=frequency, side=shaft, side_name="shaft")
@@ -212,15 +211,15 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
     ----------
     values : parameters and derived constants by name
     """
-    turns, parts = TURNS, timeline.cycle_turns(manifest, values)
+    turns, repetition = TURNS, Repetition.of(manifest, values)
     values = {**values, **timeline.settled_rates(manifest, values)}
     for bearing in manifest.bearings:
         found = frequencies_of(bearing, values)
         order = found.ball_pass_outer / found.shaft if found.shaft > 0.0 else 0.0
-        near = abs(order - round(order * parts) / parts)
+        near = abs(order - round(order * repetition.turns) / repetition.turns)
         if near * MOST > APART:
             turns = max(turns, math.ceil(APART / near))
-    return timeline.whole_cycles(manifest, values, turns)
+    return repetition.whole(turns)
 
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:

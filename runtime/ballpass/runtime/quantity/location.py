@@ -19,8 +19,9 @@ from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
-from ballpass.runtime.ratings.of_bearing import TURNS, bearing_words, contact_cosine
+from ballpass.runtime.ratings.of_bearing import bearing_words, contact_cosine
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import TURN, Turning
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
@@ -82,10 +83,10 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
         return number, asked
     angle = asked.number
     check_instant(manifest, numbers.values, quantity)
-    turning = timeline.driver(manifest, numbers.values)
-    if turning.fastest == 0.0:
+    repetition = Repetition.of(manifest, numbers.values)
+    if repetition.driver.fastest == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
-    time = turning.last_pass(angle, end, timeline.cycle_turns(manifest, numbers.values))
+    time = repetition.driver.last_pass(angle, end, repetition.turns)
     if time is None:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
     return time, asked
@@ -104,7 +105,7 @@ def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Q
     if quantity.place in _FREQUENCIES and quantity.place != "shaft":
         bearing = _bearing_of(manifest, quantity)
         moving = {**values, **timeline.highest_rates(manifest, values)}
-        if abs(moving[bearing.ring_speed]) <= TURNS * abs(timeline.shaft_speed(manifest, moving)):
+        if not timeline.turns_steadily(bearing, moving, timeline.shaft_speed(manifest, moving)):
             words = bearing_words("no ball passes", [bearing])
             raise RequestError(
                 f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that {words} "

@@ -25,7 +25,7 @@ from ballpass.runtime.request.request import Request, check_memory
 from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.loop import segments_of, steps_of
-from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import edge_times
 from ballpass.runtime.time.turning import TURN
 
 Array = NDArray[np.float64]
@@ -164,7 +164,7 @@ def passing_times(model: LoadedModel, numbers: Numbers, request: Request) -> dic
     parts: dict[str, list[Array]] = {edge: [] for edge in model.manifest.edges}
     for item in model.manifest.inputs:
         if item.kind == "gate":
-            for edge, times in timeline.edge_times(model.manifest, item, numbers.values, run.start, run.end):
+            for edge, times in edge_times(model.manifest, item, numbers.values, run.start, run.end):
                 parts.setdefault(edge, []).append(times[(times >= run.start) & (times < run.end)])
     if model.manifest.edges:
         passed = _passages_of(run)

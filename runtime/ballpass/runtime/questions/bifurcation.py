@@ -327,11 +327,11 @@ def _motion(
     """The motion from a state on: readings, their derivatives by those before, if any, and magnitudes."""
     from ballpass.runtime.motion.lyapunov import strobe_with_tangents
     from ballpass.runtime.request.start import state_at
-    from ballpass.runtime.time.timeline import alike_from
+    from ballpass.runtime.time.repetition import Repetition
 
     count = max(settling, 1) if exponent else settling + readings
     numbers = model.numbers(parameters)
-    begin = alike_from(model.manifest, numbers.values)
+    begin = Repetition.of(model.manifest, numbers.values).alike_from
     run = model.simulate(
         duration=count * step if start is not None else begin + count * step,
         times=begin + step * np.arange(1, count + 1),

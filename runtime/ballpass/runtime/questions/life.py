@@ -116,12 +116,12 @@ def _pressure(
     from ballpass.runtime.ratings.of_bearing import contacts_of
     from ballpass.runtime.request.request import Request
     from ballpass.runtime.request.resolve import resolve
-    from ballpass.runtime.solution.settle import repeats
-    from ballpass.runtime.time.timeline import cycle_turns
+    from ballpass.runtime.time.repetition import Repetition
 
     numbers = model.numbers(overrides)
     whole = resolve(model, numbers, Request())
-    turns = cycle_turns(model.manifest, numbers.values) if repeats(model, numbers.values, whole.start) else None
+    repetition = Repetition.of(model.manifest, numbers.values)
+    turns = repetition.turns if repetition.holds(whole.start) else None
     cycles = None if turns is None else model.run_settings.transient_cycles + turns
     run = resolve(model, numbers, Request(cycles=cycles))
     samples = load_samples(run)[info.prefix]
@@ -140,8 +140,7 @@ def _clearance(
 ) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.solution.settle import repeats
-    from ballpass.runtime.time.timeline import driver, whole_cycles
+    from ballpass.runtime.time.repetition import Repetition
 
     name = f"{info.path}.clearance"
     present = model.numbers(overrides).values[name]
@@ -153,9 +152,9 @@ def _clearance(
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
     table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
-    transient, values = model.run_settings.transient_cycles, model.numbers(overrides).values
-    alike = repeats(model, values, driver(model.manifest, values).after(transient))
-    turns = whole_cycles(model.manifest, values, TURNS) if alike else None
+    transient = model.run_settings.transient_cycles
+    repetition = Repetition.of(model.manifest, model.numbers(overrides).values)
+    turns = repetition.whole(TURNS) if repetition.holds(repetition.driver.after(transient)) else None
     cycles = None if turns is None else transient + turns
     found = model.simulate_many(table, [f"{info.prefix}life"], cycles=cycles)
     if found.interrupted:

@@ -243,17 +243,18 @@ def section(
     from ballpass.runtime.motion.lyapunov import period_of
     from ballpass.runtime.motion.strobe import strobe_of
     from ballpass.runtime.request.ball_angles import ball_angles
-    from ballpass.runtime.time.timeline import alike_from, cycle_turns
+    from ballpass.runtime.time.repetition import Repetition
 
     manifest = model.manifest
     given = parameters or {}
-    turn, numbers = model.period(given), model.numbers(given)
+    numbers = model.numbers(given)
+    repetition = Repetition.of(manifest, numbers.values)
+    turn, turns, alike = repetition.turn, repetition.turns, repetition.alike_from
     refuse_free_driver(manifest, "section")
     strobe = strobe_of(model, given, None, "section")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
-    angle, turns = 0.0 if at is None else at, cycle_turns(manifest, numbers.values)
-    alike = alike_from(manifest, numbers.values)
+    angle = 0.0 if at is None else at
     times = alike + turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
     begin, end = alike + turn * turns * settling, float(times[-1])
     every = np.union1d(times, strobe.sample_times(model, given, begin, end))

@@ -590,15 +590,14 @@ def _too_slow(run: Solution) -> tuple[str, ...]:
 def _turns(model: AnyModel, parameters: Mapping[str, float] | None, transient: float | None) -> float | None:
     """Turns of a run that separates ball pass from the shaft; None for those of the scene, where turns differ."""
     from ballpass.runtime.quantity.characteristic import turns_to_separate
-    from ballpass.runtime.solution.settle import repeats
-    from ballpass.runtime.time.timeline import driver
+    from ballpass.runtime.time.repetition import Repetition
 
     manifest, values = model.manifest, model.numbers(parameters).values
-    turning, settings = driver(manifest, values), model.run_settings
+    repetition, settings = Repetition.of(manifest, values), model.run_settings
     dropped = settings.transient_cycles if transient is None else transient
-    if not repeats(model, values, turning.after(dropped)):
+    if not repetition.holds(repetition.driver.after(dropped)):
         return None
-    stated = settings.cycles if settings.cycles is not None else turning.turns(0.0, settings.duration or 0.0)
+    stated = repetition.driver.turns(0.0, settings.duration or 0.0) if settings.cycles is None else settings.cycles
     return max(stated, dropped + turns_to_separate(manifest, values))
 
 

@@ -299,7 +299,7 @@ def steady(
     from ballpass.runtime.motion.contact_sequence import contact_sequence
     from ballpass.runtime.motion.forcing_period import common_period, forcing_period, refuse_free_driver, sampled_turns
     from ballpass.runtime.motion.shooting import Shooting
-    from ballpass.runtime.time.timeline import alike_from
+    from ballpass.runtime.time.repetition import Repetition
 
     manifest = model.manifest
     _ = model.stepper  # refused here where a scene has none
@@ -350,7 +350,7 @@ def steady(
         repeats=repeats,
         sooner=sooner,
         start=found.nodes[0],
-        begin=alike_from(manifest, numbers.values),
+        begin=Repetition.of(manifest, numbers.values).alike_from,
         multipliers=found.multipliers,
         resolution=SENSITIVITY * sampled.statistics.rtol,
         contacts=contacts,
@@ -370,10 +370,10 @@ def _run(
     """A run without outputs over turns that are alike, from the scene's start if no state there is given, sampled at
     the ends of equal parts."""
     from ballpass.runtime.request.start import state_at
-    from ballpass.runtime.time.timeline import alike_from
+    from ballpass.runtime.time.repetition import Repetition
 
     numbers = model.numbers(parameters)
-    begin = alike_from(model.manifest, numbers.values)
+    begin = Repetition.of(model.manifest, numbers.values).alike_from
     found: Solution = model.simulate(
         duration=duration if initial is not None else begin + duration,
         parameters=parameters,

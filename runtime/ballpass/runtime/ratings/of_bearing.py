@@ -15,6 +15,7 @@ from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.ratings.branches import cosine
 from ballpass.runtime.ratings.elements import RATED, ElementGeometry, RacewayContact, RatedElement, element_words
 from ballpass.runtime.ratings.life import ElementLife
+from ballpass.runtime.time.timeline import turns_steadily
 
 __all__ = ["RacewayContact"]
 
@@ -117,10 +118,6 @@ def radial_gap(bearing: BearingInfo, values: Mapping[str, float]) -> float:
     return values.get(f"{bearing.path}.radial_gap", 0.5 * values[f"{bearing.path}.clearance"])
 
 
-#: Rings turn against each other above this part of the speed of the driver [1].
-TURNS = 1e-9
-
-
 def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: float) -> str:
     """Why no standard gives the bearing a life; empty where one does.
 
@@ -129,7 +126,7 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
     values : parameters and derived constants by name
     shaft_speed : of driver or shaft [rad/s]
     """
-    if abs(values[bearing.ring_speed]) > TURNS * abs(shaft_speed):
+    if turns_steadily(bearing, values, shaft_speed):
         return ""
     name = f"The bearing {bearing.name}" if bearing.name else "The bearing"
     if shaft_speed == 0.0:

@@ -19,6 +19,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoints
 from ballpass.runtime.time.turning import TURN
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
@@ -51,7 +52,7 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
         They would not fit into memory, or the times of a table do not increase.
     """
     fastest = check_count(model.manifest, numbers, end - begin, turn)
-    cuts = timeline.breakpoints(model.manifest, numbers.values, begin, end)
+    cuts = breakpoints(model.manifest, numbers.values, begin, end)
     if math.isfinite(turn):
         near = time_resolution(begin, end, turn)
         whole = turn * np.arange(math.floor(begin / turn) + 1, math.ceil(end / turn))

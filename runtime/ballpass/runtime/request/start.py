@@ -109,7 +109,7 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
         for one in (before, numbers)
     )
     moved = np.abs(beside(others, angles))
-    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / timeline.period(model.manifest, numbers.values)):
+    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / timeline.driver(model.manifest, numbers.values).turn):
         balls = bearing_words("balls", model.manifest.bearings)
         what = "the driver" if moved[0] == np.max(moved) else balls
         raise RequestError(

@@ -20,6 +20,7 @@ from ballpass.runtime.request.direction_scales import direction_scales
 from ballpass.runtime.request.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.time import timeline
+from ballpass.runtime.time.breakpoints import breakpoint_slopes
 from ballpass.runtime.time.turning import Turning
 
 
@@ -123,7 +124,7 @@ class Chain:
         RequestError
             Several loads switch at that time, and a parameter moves one of them away from another.
         """
-        edges, shifts = timeline.breakpoint_slopes(self._manifest, self._values, self.moved_numbers, time)
+        edges, shifts = breakpoint_slopes(self._manifest, self._values, self.moved_numbers, time)
         if not edges:
             return None
         apart = np.ptp(shifts, axis=0) > 1e-9 * np.max(np.abs(shifts), axis=0)

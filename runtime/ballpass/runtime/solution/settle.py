@@ -23,7 +23,6 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
-from ballpass.runtime.request.beats import slowest_beat
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
 from ballpass.runtime.request.start import state_at
@@ -32,7 +31,7 @@ from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.solution.solution import Solution
-from ballpass.runtime.time import timeline
+from ballpass.runtime.time.repetition import MOST_RUN, Repetition
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
 PEAKS, MEANS = 5e-3, 1e-2
@@ -40,8 +39,8 @@ PEAKS, MEANS = 5e-3, 1e-2
 #: Part of its range by which an extreme of a channel is above all of later turns where it is one of the start [1].
 START = 5e-2
 
-#: Steady turns that are compared with twice as many at first, and the most that are run.
-LEAST, MOST = 64, 4096
+#: Steady turns that are compared with twice as many at first.
+LEAST = 64
 
 #: Steps that `look_further` may take beside a run: some tenth of a second.
 STEPS = 100_000
@@ -89,7 +88,7 @@ class Settled(ShortRepr):
         )
 
 
-def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = MOST) -> Settled:
+def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = MOST_RUN) -> Settled:
     """Continue a run until twice the turns change nothing.
 
     Parameters
@@ -106,15 +105,15 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     """
     if request.cycles is not None or request.duration is not None:
         raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
-    turn = timeline.period(model.manifest, numbers.values)
-    slowest = timeline.longest_harmonic(model.manifest, numbers.values)
-    slowest = math.ceil(max(slowest, slowest_beat(model.manifest, numbers.values, MOST // 2 * turn)) / turn)
-    turns = timeline.whole_cycles(model.manifest, numbers.values, max(LEAST, slowest))
+    repetition = Repetition.of(model.manifest, numbers.values)
+    turn = repetition.turn
+    slowest = math.ceil(max(repetition.slowest_load, repetition.slowest_beat(MOST_RUN // 2 * turn)) / turn)
+    turns = repetition.whole(max(LEAST, slowest))
     if not (real(most) >= 2 * turns and float(most).is_integer()):
         why = f" The slowest harmonic load, or beat, takes {slowest} turns for a period." if slowest > LEAST else ""
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * turns} on is expected.{why}")
     span = asked_span(model, numbers, replace(request, cycles=1.0))
-    if not repeats(model, numbers.values, span.start):
+    if not repetition.holds(span.start):
         raise RequestError(
             "settle: load, speed or slip of this scene follow a table or a window over time, so that its turns are "
             "unlike each other. Give a transient behind its last row (transient, --transient), or run the turns that "
@@ -190,16 +189,15 @@ def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = Non
         The longer run failed.
     """
     model, turn = run.model, run.span.turning.turn
-    if not repeats(model, run.numbers.values, run.start):
+    repetition = Repetition.of(model.manifest, run.numbers.values)
+    if not repetition.holds(run.start):
         return None
     if few is None:
         few = reduced(run)
     whole = (few.start + few.duration - run.begin) / turn
-    cycle = timeline.cycle_turns(model.manifest, run.numbers.values)
     if turns is None:
-        least = timeline.whole_cycles(model.manifest, run.numbers.values, LEAST)
-        turns = min(least, int(STEPS * whole / max(few.steps, 1)))
-        turns -= turns % cycle
+        turns = min(repetition.whole(LEAST), int(STEPS * whole / max(few.steps, 1)))
+        turns -= turns % repetition.turns
     if turns < 2.0 * few.duration / turn:
         return None
     longer, counter = replace(run, span=run.span.counting(turns), progress=None), _counter(model)
@@ -214,14 +212,6 @@ def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = Non
     changes = changed(few, found, noise, counter)
     first = extremes_of_start(few, later, noise, counter)
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
-
-
-def repeats(model: LoadedModel, values: Mapping[str, float], begin: float) -> bool:
-    """Whether turns from a time on [s] are alike: something turns, and no table over time changes a value then."""
-    turn = timeline.period(model.manifest, values)
-    if not math.isfinite(turn) or not math.isfinite(begin):
-        return False
-    return not timeline.changes_over_time(model.manifest, values, begin, begin + MOST * turn)
 
 
 def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:

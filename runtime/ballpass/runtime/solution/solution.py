@@ -250,10 +250,11 @@ class Solution:
     @property
     def period(self) -> float | None:
         """Time of a turn [s]; None where nothing turns, or its speed changes in the samples."""
-        values = {**self.parameters, **self.constants}
         if timeline.is_free(self.manifest) or not len(self.t):
             return None
-        return self.cycle_length if timeline.turns_evenly(self.manifest, values, float(self.t[0])) else None
+        turning = timeline.driver(self.manifest, {**self.parameters, **self.constants})
+        even = turning.even_from <= float(self.t[0]) * (1.0 + timeline.TIME_RESOLUTION)
+        return self.cycle_length if even else None
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions.

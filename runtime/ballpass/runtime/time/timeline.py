@@ -1,6 +1,6 @@
-"""Values of the inputs at a time, and the times at which they change: what turns, windows, tables.
+"""What turns, and values of the inputs at a time: angles, windows, tables.
 
-In: a manifest and values by name.  Out: numbers for ``u``, times of breakpoints, their derivatives along directions.
+In: a manifest and values by name.  Out: numbers for ``u``, and their derivatives along directions.
 
 Angles are reduced modulo a turn here, so that the generated code sees small arguments in the thousandth turn as well.
 """
@@ -8,21 +8,21 @@ Angles are reduced modulo a turn here, so that the generated code sees small arg
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import InputInfo, Manifest, TurningInfo
+from ballpass.runtime.contract.manifest import BearingInfo, InputInfo, Manifest, TurningInfo
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, STEP, TURN, Turning, Values, knots, past
 
 #: Times closer than this fraction of the interval under study are one time [1].
 TIME_RESOLUTION = 1e-12
 
-#: Rows at later times are not met: the end of a load that has none [s].
-NEVER = 1e8
+#: Rings turn against each other above this part of the speed of the driver [1].
+TURNS = 1e-9
 
 
 def speed_name(manifest: Manifest) -> str | None:
@@ -39,12 +39,6 @@ def shaft_speed(manifest: Manifest, values: Values) -> float:
     """
     name = speed_name(manifest)
     return 0.0 if name is None else float(values[name])
-
-
-def period(manifest: Manifest, values: Values) -> float:
-    """Time of one turn of driver or shaft [s], behind the last row of a table of its speed; infinite when it stands or
-    none exists."""
-    return driver(manifest, values).turn
 
 
 def stretch(manifest: Manifest, values: Values) -> float:
@@ -119,42 +113,15 @@ def one_speed(manifest: Manifest, values: Values) -> bool:
     return info is None or len({values[name] for name in info.speeds}) <= 1
 
 
-def turns_evenly(manifest: Manifest, values: Values, begin: float) -> bool:
-    """Whether no table changes the driver's speed behind a time [s]."""
-    info = driver_info(manifest)
-    rows = [] if info is None else _changing(info.times, info.speeds, values)
-    return all(last <= begin * (1.0 + TIME_RESOLUTION) for _, last in rows)
-
-
 def is_even(manifest: Manifest, values: Values) -> bool:
     """Whether the driver's speed is constant: no torque drives, and no table has rows of unlike speeds."""
     return not is_free(manifest) and one_speed(manifest, values)
 
 
-def cycle_turns(manifest: Manifest, values: Values) -> int:
-    """Turns of driver or shaft after which all loads over its angle repeat: two for a four-stroke engine."""
-    if is_free(manifest):  # its tables are no inputs
-        return math.lcm(1, *(turns for _, turns in manifest.mechanism.turns)) if manifest.mechanism else 1
-    tables = (item for item in manifest.inputs if item.kind == "table" and item.turns > 1)
-    return math.lcm(1, *(repeats_after(item, values) for item in tables))
-
-
-def repeats_after(item: InputInfo, values: Values) -> int:
-    """Turns after which a table over an angle repeats: fewer than it has where its parts are alike."""
-    angles, heights = _knots(item, values)
-    least, whole = 1e-12 * float(np.max(np.abs(heights))), item.turns * TURN
-    for turns in range(1, item.turns):
-        moved = np.concatenate([angles, angles + turns * TURN])
-        apart = np.subtract(*(np.interp(moved + by * TURN, angles, heights, period=whole) for by in (0, turns)))
-        if item.turns % turns == 0 and np.max(np.abs(apart)) <= least:
-            return turns
-    return item.turns
-
-
-def whole_cycles(manifest: Manifest, values: Values, turns: int) -> int:
-    """At least so many turns: as many as all loads repeat after, or several times that."""
-    cycle = cycle_turns(manifest, values)
-    return cycle * math.ceil(turns / cycle)
+def turns_steadily(bearing: BearingInfo, values: Values, speed: float) -> bool:
+    """Whether a bearing's rings turn against each other, and do not only swing, at a speed of driver or shaft
+    [rad/s]."""
+    return float(abs(values[bearing.ring_speed])) > TURNS * abs(speed)
 
 
 def set_moving(manifest: Manifest, values: Values) -> dict[str, float]:
@@ -273,7 +240,7 @@ def _input(
         return np.zeros(len(t))
     if item.kind == "gate":
         angle = turning[item.turning].times(item.parts).at(inside)[0].real
-        within = [_covers(angle, start, width) for start, width in _windows(item, values)]
+        within = [_covers(angle, start, width) for start, width in windows_of(item, values)]
         return np.asarray(np.any(within, axis=0), dtype=float)
     if item.kind in ("table", "table_rate"):
         return _table(item, values, t, inside, turning.get(item.turning))
@@ -328,206 +295,6 @@ def names_of_input(manifest: Manifest, item: InputInfo) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*turning, *edges, *item.times, *item.values]))
 
 
-def loads(manifest: Manifest) -> dict[str, list[TurningInfo]]:
-    """Turnings of loads with a rate of their own, by that rate."""
-    found: dict[str, list[TurningInfo]] = {}
-    for info in manifest.turnings:
-        if info.kind == "load":
-            found.setdefault(info.rate, []).append(info)
-    return found
-
-
-def longest_harmonic(manifest: Manifest, values: Values) -> float:
-    """Period of the slowest harmonic load [s]; zero without one."""
-    return max((TURN / float(values[rate]) for rate in loads(manifest)), default=0.0)
-
-
-def rows_over_time(manifest: Manifest, values: Values, begin: float, end: float) -> np.ndarray:
-    """Times in (begin, end) of rows of tables over time: load or its window, driver's speed, cage's slip [s]."""
-    return _apart([np.zeros(0), *_rows(manifest, values)], begin, end)
-
-
-def changes_over_time(manifest: Manifest, values: Values, begin: float, end: float) -> bool:
-    """Whether a table over time changes a value in (begin, end) [s]: turns there are unlike each other."""
-    near = TIME_RESOLUTION * max(abs(begin), abs(end))
-    return any(first < end - near and last > begin + near for first, last in _changes(manifest, values))
-
-
-def settled_after(manifest: Manifest, values: Values) -> float:
-    """Time of the last row that changes a value; rows of equal value are no rows [s].  Minus infinity without one."""
-    return max((last for _, last in _changes(manifest, values)), default=-math.inf)
-
-
-def alike_from(manifest: Manifest, values: Values) -> float:
-    """Time from which on turns are alike, driver or shaft at its first angle [s]; 0 where no row changes a value."""
-    settled = settled_after(manifest, values)
-    if not settled > 0.0:
-        return 0.0
-    turning = driver(manifest, values)
-    found = turning.first_pass(float(turning.at(0.0)[0]), cycle_turns(manifest, values), settled)
-    return settled if found is None else found
-
-
-def alike_from_slope(manifest: Manifest, values: Values, moved: Mapping[str, float]) -> float:
-    """Its derivative along a direction of the values [s/unit]."""
-    info, begin = driver_info(manifest), alike_from(manifest, values)
-    if info is None or begin == 0.0:
-        return 0.0
-    start = moved.get(info.offset, 0.0) if info.offset else 0.0
-    return (start - angle_slope(info, values, moved, begin)) / float(Turning.of(info, values).at(begin)[1])
-
-
-def _changes(manifest: Manifest, values: Values) -> Iterator[tuple[float, float]]:
-    """Spans of time in which tables over time change a value; one that jumps does so at once [s]."""
-    valued = {item.times for item in manifest.inputs if item.kind == "table"}
-    tables = [(info.times, info.speeds, False) for info in manifest.turnings if info.times]
-    tables += [
-        (item.times, item.values, item.kind == "table_rate")
-        for item in manifest.inputs
-        if item.kind in ("table", "table_rate")
-        and not item.turning
-        and (item.kind == "table" or item.times not in valued)
-    ]
-    for names, heights, steps in tables:
-        times, at = knots(names, values), np.array([values[name] for name in heights])
-        if steps:  # what acts is the slope
-            slopes = np.concatenate([np.zeros(1), np.diff(at) / np.diff(times), np.zeros(1)])
-            jumps = times[(np.diff(slopes) != 0.0) & (times < NEVER)]
-            yield from zip(jumps.tolist(), jumps.tolist(), strict=True)
-        else:
-            yield from _changing(names, heights, values)
-
-
-def _changing(names: tuple[str, ...], heights: tuple[str, ...], values: Values) -> list[tuple[float, float]]:
-    """Spans of time between rows of unlike values [s]."""
-    times, at = knots(names, values), np.array([values[name] for name in heights])
-    behind = np.flatnonzero(np.diff(at) != 0.0) if len(times) else np.zeros(0, dtype=int)
-    return list(zip(times[behind].tolist(), times[behind + 1].tolist(), strict=True))
-
-
-def _rows(manifest: Manifest, values: Values) -> Iterator[np.ndarray]:
-    for info in manifest.turnings:
-        yield from (knots(names, values) for names in (info.times, info.lag_times) if names)
-    for item in manifest.inputs:
-        if item.kind in ("table", "table_rate") and not item.turning:
-            yield knots(item.times, values)
-
-
-def breakpoints(
-    manifest: Manifest, values: Values, t0: float, t1: float, among: Iterable[InputInfo] | None = None
-) -> np.ndarray:
-    """Times in the open interval (t0, t1) at which a gate switches or a table has a knot.
-
-    A window of zero width and one of a turn or more never switch.
-
-    Parameters
-    ----------
-    among : inputs of the manifest.  Default: all
-
-    Returns
-    -------
-    array, shape (breakpoints,), increasing [s]
-
-    Raises
-    ------
-    RequestError
-        More than `turning.MOST_TURNS` turns.
-    """
-    found = [np.zeros(0), *_rows(manifest, values)]
-    for item in manifest.inputs if among is None else among:
-        if item.kind == "gate":
-            found += [times for _, times in edge_times(manifest, item, values, t0, t1)]
-        elif item.kind in ("table", "table_rate") and item.turning:
-            turning = Turning.of(info_of(manifest, item), values)
-            found += [turning.passes(float(a), t0, t1, item.turns) for a in _knots(item, values)[0]]
-    return _apart(found, t0, t1)
-
-
-def _apart(found: Sequence[np.ndarray], t0: float, t1: float) -> np.ndarray:
-    """Sorted times between two, those that are one time once."""
-    near = TIME_RESOLUTION * max(abs(t0), abs(t1))
-    times = np.sort(np.concatenate(found))
-    times = times[(t0 + near < times) & (times < t1 - near)]
-    if np.all(np.diff(times) > near):
-        return times
-    apart: list[float] = []
-    for time in times.tolist():
-        if not apart or time - apart[-1] > near:
-            apart.append(time)
-    return np.array(apart)
-
-
-def edge_times(
-    manifest: Manifest, gate: InputInfo, values: Values, t0: float, t1: float
-) -> Iterator[tuple[str, np.ndarray]]:
-    """Parameters or constants that are edges of a gate's windows, and times in [t0, t1] at which it passes them [s]."""
-    turning = Turning.of(info_of(manifest, gate), values).times(gate.parts)
-    for names, (start, width) in zip(gate.windows, _windows(gate, values), strict=True):
-        if 0.0 < width < TURN:
-            for name, edge in zip(names, (start, start + width), strict=True):
-                yield name, turning.passes(edge, t0, t1)
-
-
-def breakpoint_slopes(
-    manifest: Manifest, values: Values, moved: Sequence[Mapping[str, float]], t: float
-) -> tuple[list[str], np.ndarray]:
-    """Derivatives of the time of the breakpoint at `t` along directions of the values.
-
-    Parameters
-    ----------
-    moved : the directions, as for `input_slopes`
-
-    Returns
-    -------
-    what lies there, of loads that switch or else of tables that bend, by name; shape (edges, directions) [s/unit]
-    """
-    jumps: dict[tuple[str, str, int], None] = {}
-    bends: dict[tuple[str, str, int], None] = {}
-    for item in manifest.inputs:
-        if item.kind == "gate" or (item.kind == "table" and item.turning):
-            angle, rate = Turning.of(info_of(manifest, item), values).times(item.parts).at(t)
-            if rate == 0.0:
-                continue
-            found = jumps if item.kind == "gate" else bends
-            for name, edge in _edges(item, values):
-                if _passes(float(angle), edge, item.turns):
-                    found[(name, item.turning, item.parts)] = None
-        elif item.kind in ("table", "table_rate"):
-            found = bends if item.kind == "table" else jumps
-            found.update(dict.fromkeys((name, "", 1) for name in _rows_near(item.times, values, t)))
-    for info in manifest.turnings:
-        for names in (info.times, info.lag_times):
-            jumps.update(dict.fromkeys((name, "", 1) for name in _rows_near(names, values, t)))
-    keys = [*(jumps or bends)]
-    slopes = np.zeros((len(keys), len(moved)))
-    infos = {info.name: info for info in manifest.turnings}
-    for row, (name, turning, parts) in enumerate(keys):
-        slopes[row] = [direction.get(name, 0.0) for direction in moved]
-        if turning:
-            turned = np.array([angle_slope(infos[turning], values, direction, t) for direction in moved])
-            slopes[row] = (slopes[row] / parts - turned) / Turning.of(infos[turning], values).at(t)[1]
-    return [name for name, _, _ in keys], slopes
-
-
-def _rows_near(names: Sequence[str], values: Values, t: float) -> list[str]:
-    times = np.array([values[name] for name in names])
-    return [
-        name
-        for name, time in zip(names, times, strict=True)
-        if abs(time - t) <= TIME_RESOLUTION * max(abs(t), 1e-300, float(np.max(np.abs(times))))
-    ]
-
-
-def _edges(item: InputInfo, values: Values) -> Iterator[tuple[str, float]]:
-    """Angles at which an input changes, by name: edges of windows that switch, knots of a table."""
-    if item.kind == "table":
-        yield from zip(item.times, _knots(item, values)[0].tolist(), strict=True)
-    else:
-        for names, (start, width) in zip(item.windows, _windows(item, values), strict=True):
-            if 0.0 < width < TURN:
-                yield from zip(names, (start, start + width), strict=True)
-
-
 def info_of(manifest: Manifest, item: InputInfo) -> TurningInfo:
     return next(info for info in manifest.turnings if info.name == item.turning)
 
@@ -549,7 +316,7 @@ def table_piece(manifest: Manifest, item: InputInfo, values: Values, t: float) -
 
     The rounding of a time that lies on a knot decides on which side it is.
     """
-    at, argument = _knots(item, values)[0], t
+    at, argument = table_knots(item, values)[0], t
     if item.turning:
         argument = at[0] + past(Turning.of(info_of(manifest, item), values).at(t)[0], at[0], item.turns)
         at = np.append(at, at[0] + item.turns * TURN)
@@ -566,7 +333,7 @@ def _table(
     item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray, turning: Turning | None = None
 ) -> np.ndarray:
     """Value at `t`, or slope, of the piece of a table that holds at `inside`."""
-    at, heights = _knots(item, values)
+    at, heights = table_knots(item, values)
     begin, now = inside, t
     if turning is not None:
         angle = turning.held(inside, inside)[0]
@@ -583,12 +350,7 @@ def _table(
     return np.where(within, heights[left] + slopes * (now - at[left]), heights[left])
 
 
-def _passes(angle: float, edge: float, turns: int = 1) -> bool:
-    """Whether an angle is that of an edge, but for the rounding of the time at which it is passed."""
-    return abs(math.remainder(angle - edge, turns * TURN)) < 1e3 * ANGLE_RESOLUTION * max(1.0, abs(angle))
-
-
-def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
+def windows_of(item: InputInfo, values: Values) -> list[tuple[float, float]]:
     """(start in [0, 2 pi), width) of each window [rad]; an end before the start lies in the next turn."""
     windows = []
     for first, last in item.windows:
@@ -611,7 +373,14 @@ def _covers(angle: np.ndarray, start: float, width: float) -> np.ndarray:
     return np.asarray(past(angle, start) < width - ANGLE_RESOLUTION)
 
 
-def _knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:
+def table_knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Where a table has its rows, times [s] or angles [rad], and its values there.
+
+    Raises
+    ------
+    RequestError
+        They do not increase, or do not lie within the turns of the table.
+    """
     at = knots(item.times, values, *(("angles", "rad") if item.turning else ("times", "s")))
     heights = np.array([values[name] for name in item.values])
     if item.turning and not at[-1].real - at[0].real < item.turns * TURN - ANGLE_RESOLUTION:

@@ -111,6 +111,12 @@ class Turning:
         """Whether it turns at one rate."""
         return self.begin.size == 1 and not self.half[0]
 
+    @property
+    def even_from(self) -> float:
+        """Time from which on it turns at one rate [s]."""
+        bent = np.flatnonzero(self.half)
+        return float(self.begin[bent[-1] + 1].real) if bent.size else 0.0
+
     def times(self, multiple: int) -> Turning:
         """So many times the angle."""
         if multiple == 1:

@@ -12,8 +12,9 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.quantity.location import moved_numbers
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, View
+from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.span import Span
-from ballpass.runtime.time.timeline import along, cycle_turns, driver_info, is_free
+from ballpass.runtime.time.timeline import along, driver_info, is_free
 from ballpass.runtime.time.turning import STEP, TURN, Turning
 
 #: Part of a turn by which times miss it by rounding.
@@ -45,7 +46,7 @@ def whole_cycles(span: Span, cycle: int) -> tuple[float, float] | None:
 def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
-    span, cycle = view.run.span, cycle_turns(view.manifest, view.numbers.values)
+    span, cycle = view.run.span, Repetition.of(view.manifest, view.numbers.values).turns
     window = whole_cycles(span, cycle)
     if window is None:
         raise RequestError(
