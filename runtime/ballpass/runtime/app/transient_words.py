@@ -19,7 +19,7 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
-from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced, tolerated
+from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced
 from ballpass.runtime.time.breakpoints import rows_over_time
 from ballpass.runtime.time.repetition import Repetition
 
@@ -137,11 +137,11 @@ def _part_of_beats(run: Run, longer: Settled | None) -> list[str]:
     slow = [one for one in repetition.beats() if one.period > turns * turn]
     if not slow or not repetition.holds(run.start):
         return []
-    here, noise = reduced(run), tolerated(run)
+    here = reduced(run)
     for beat in slow:
         half = {name: values[name] + step for name, step in beat.half.items()}
         there = reduced(replace(run, numbers=model.numbers({**run.numbers.parameters, **half})))
-        changes = changed(here, there, noise)
+        changes = changed(run, here, there)
         name = max(changes, key=lambda one: max(changes[one][0] / PEAKS, changes[one][1] / MEANS))
         peak, mean = changes[name]
         if peak <= PEAKS and mean <= MEANS:

@@ -22,9 +22,9 @@ from ballpass.runtime.ratings.life import raceway_life
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
-from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
+from ballpass.runtime.run.reduced_run import ReducedRun
 from ballpass.runtime.run.reductions import Reduction, raceway_powers, reduction_of
-from ballpass.runtime.solution.settle import LEAST, PEAKS
+from ballpass.runtime.solution.settle import LEAST, PEAKS, doubled, until_alike
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.repetition import MOST_RUN, Repetition
 from ballpass.runtime.time.turning import TURN
@@ -82,23 +82,11 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     if slowest > 1.0:  # whole periods of the load, as far as there are turns
         turns = slowest * math.ceil(turns / slowest)
     covered, turns = 2 * turns <= MOST_RUN, min(turns, MOST_RUN // 2)
-    run = resolve(model, numbers, request, span=span.counting(turns) if doubles else span)
-    going = start_reducing(run, _channels(model))
-    start, end = going.run.start, going.run.end
-    if not doubles:
-        going.go_on((start + end) / 2.0)
-        before = _history(going)
-        going.go_on(end)
-        return _compared(going, before)
-    going.go_on(end)
-    before = _history(going)
-    while True:
-        turns *= 2
-        going.go_on(start + turns * turn)
-        found = _compared(going, before)
-        if found.settled or 2 * turns > MOST_RUN:
-            return replace(found, settled=found.settled and covered)
-        before = found
+    span = span.counting(turns) if doubles else span
+    run = resolve(model, numbers, request, span=span)
+    ends = doubled(span, turns, MOST_RUN) if doubles else ((run.start + run.end) / 2.0, run.end)
+    found = until_alike(run, _channels(model), ends, _compared)
+    return replace(found, settled=found.settled and (covered or not doubles))
 
 
 def _channels(model: LoadedModel) -> list[str]:
@@ -141,9 +129,11 @@ def _history(going: ReducedRun) -> LoadHistory:
     )
 
 
-def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
+def _compared(going: ReducedRun, before: LoadHistory | None) -> LoadHistory:
     """Loads so far, with the change since the last ones."""
     found = _history(going)
+    if before is None:
+        return found
     model, values = going.run.model, going.run.numbers.values
     moving = {**going.run.numbers.parameters, **timeline.set_moving(model.manifest, values)}
     turning = model.numbers(moving).values

@@ -14,8 +14,9 @@ second half of the turns misses an extreme of the first by more than `START` of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -26,12 +27,13 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
 from ballpass.runtime.request.start import state_at
-from ballpass.runtime.run.reduced_run import start_reducing
+from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time.repetition import MOST_RUN, Repetition
+from ballpass.runtime.time.span import Span
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
 PEAKS, MEANS = 5e-3, 1e-2
@@ -44,6 +46,14 @@ LEAST = 64
 
 #: Steps that `look_further` may take beside a run: some tenth of a second.
 STEPS = 100_000
+
+
+class _Found(Protocol):
+    @property
+    def settled(self) -> bool: ...
+
+
+Alike = TypeVar("Alike", bound=_Found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -120,24 +130,55 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
             "are meant, without settle."
         )
     run = resolve(model, numbers, request, span=span.counting(turns))
-    going, counter, noise = start_reducing(run, channel_names(model.manifest)), _counter(model), tolerated(run)
-    going.go_on()
-    before, lost = going.take(), 0
-    while True:
-        turns *= 2
-        going.go_on(run.start + turns * turn)
+
+    def compared(going: ReducedRun, before: Settled | None) -> Settled:
         later = going.take()
-        found = joined(before, later)
-        assert found is not None
-        changes = changed(before, found, noise, counter)
-        of_start = bool(extremes_of_start(before, later, noise, counter))
-        settled = _settled(changes) and not of_start
-        if settled or 2 * turns > most:
-            return Settled(reductions=found, turns=turns - lost, settled=settled, changes=changes, dropped=lost)
-        if of_start:
-            before, lost = later, turns // 2
-        else:
-            before = found
+        if before is None:
+            return Settled(reductions=later, turns=turns, settled=False, changes={})
+        done = 2 * (before.dropped + before.turns)
+        found = _compared(run, before.reductions, before.reductions, later, done - before.dropped, before.dropped)
+        if not found.first:
+            return found
+        # the first half is of the start
+        return replace(found, reductions=later, turns=done // 2, dropped=done // 2, settled=False, first={})
+
+    return until_alike(run, channel_names(model.manifest), doubled(span, turns, most), compared)
+
+
+def until_alike(
+    run: Run,
+    channels: Collection[str],
+    ends: Iterable[float],
+    compared: Callable[[ReducedRun, Alike | None], Alike],
+) -> Alike:
+    """Continue a run from one end to the next until what is found there is settled.
+
+    Parameters
+    ----------
+    channels : that are reduced
+    ends : times [s]
+    compared : gives what is found so far, compared with what was found at the end before; None at the first one
+
+    Raises
+    ------
+    SimulationError
+        The computation failed.
+    """
+    going, found = start_reducing(run, channels), None
+    for end in ends:
+        going.go_on(end)
+        found = compared(going, found)
+        if found.settled:
+            break
+    assert found is not None  # there is an end
+    return found
+
+
+def doubled(span: Span, turns: float, most: float) -> Iterator[float]:
+    """Ends of so many turns that count, of twice as many, and so on up to the most [s]."""
+    while turns <= most:
+        yield span.counting(turns).end
+        turns *= 2
 
 
 def look_further(model: LoadedModel, numbers: Numbers, solution: Solution, turns: int | None = None) -> Settled | None:
@@ -200,60 +241,58 @@ def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = Non
         turns -= turns % repetition.turns
     if turns < 2.0 * few.duration / turn:
         return None
-    longer, counter = replace(run, span=run.span.counting(turns), progress=None), _counter(model)
+    longer = replace(run, span=run.span.counting(turns), progress=None)
     going = start_reducing(longer, channel_names(model.manifest))
     going.go_on((longer.start + longer.end) / 2.0)
     early = going.take()
     going.go_on()
-    later = going.take()
+    return _compared(longer, few, early, going.take(), turns)
+
+
+def _compared(run: Run, few: Reductions, early: Reductions, later: Reductions, turns: int, dropped: int = 0) -> Settled:
+    """What both halves of some turns have, compared with fewer turns."""
     found = joined(early, later)
     assert found is not None
-    noise = tolerated(longer)
-    changes = changed(few, found, noise, counter)
-    first = extremes_of_start(few, later, noise, counter)
-    return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes, first=first)
+    changes = changed(run, few, found)
+    return Settled(
+        reductions=found,
+        turns=turns,
+        settled=all(peak <= PEAKS and mean <= MEANS for peak, mean in changes.values()),
+        changes=changes,
+        dropped=dropped,
+        first=extremes_of_start(run, few, later),
+    )
 
 
-def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:
-    return all(peak <= PEAKS and mean <= MEANS for peak, mean in changes.values())
+def _tolerated(run: Run) -> dict[str, float]:
+    """What steps may be off by in each state: of a ring that has come to rest no digit is left.
+
+    Infinite for the driver's angle, which counts turns.
+    """
+    found = dict(zip(run.model.states, (run.rtol * run.magnitude).tolist(), strict=True))
+    mechanism = run.model.manifest.mechanism
+    return found | ({mechanism.angle: math.inf} if mechanism is not None and mechanism.angle else {})
 
 
-def _counter(model: LoadedModel) -> str:
-    """The channel that counts turns: the driver's angle where it is a state; empty without."""
-    mechanism = model.manifest.mechanism
-    return "" if mechanism is None else mechanism.angle
-
-
-def tolerated(run: Run) -> dict[str, float]:
-    """What steps may be off by in each state: of a ring that has come to rest no digit is left."""
-    return dict(zip(run.model.states, (run.rtol * run.magnitude).tolist(), strict=True))
-
-
-def changed(
-    few: Reductions, many: Reductions, noise: Mapping[str, float], counter: str = ""
-) -> dict[str, tuple[float, float]]:
-    """Change of extremes over the range of each channel but the `counter`, and of its rms [1]; none within `noise`."""
-    found = {}
+def changed(run: Run, few: Reductions, many: Reductions) -> dict[str, tuple[float, float]]:
+    """Change of the extremes of each channel of a run over its range, and of its rms [1]; none within rounding."""
+    found, tolerated = {}, _tolerated(run)
     for name, less in few.items():
-        if name == counter:
-            continue
-        more, span, least = many[name], many[name].range, noise.get(name, 0.0)
+        more, span, least = many[name], many[name].range, tolerated.get(name, 0.0)
         peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
         mean = abs(less.rms / more.rms - 1.0) if abs(less.rms - more.rms) > least and more.rms > 0.0 else 0.0
         found[name] = (peak / span if peak > least and span > 0.0 else 0.0, mean)
     return found
 
 
-def extremes_of_start(
-    few: Reductions, later: Reductions, noise: Mapping[str, float], counter: str = ""
-) -> dict[str, tuple[str, float, float, float]]:
-    """Extremes that later turns do not come near, as `Settled.first`; not of the `counter`, and none within `noise`."""
-    found = {}
+def extremes_of_start(run: Run, few: Reductions, later: Reductions) -> dict[str, tuple[str, float, float, float]]:
+    """Extremes that later turns do not come near, as `Settled.first`; none within rounding."""
+    found, tolerated = {}, _tolerated(run)
     for name, first in few.items():
         behind = later[name]
         up, down = first.maximum - behind.maximum, behind.minimum - first.minimum
         missed = max(up, down)
-        if name != counter and missed > max(START * behind.range, noise.get(name, 0.0)):
+        if missed > max(START * behind.range, tolerated.get(name, 0.0)):
             most = ("max", first.maximum_time, first.maximum, behind.maximum)
             found[name] = most if up >= down else ("min", first.minimum_time, first.minimum, behind.minimum)
     return found
