@@ -14,6 +14,7 @@ from ballpass.derive.scene.bearing_records import EquivalentMass
 from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.certify.simplification import measure_simplification
+from ballpass.runtime.report.report import ReportTable
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 TWO_WAY = SCENES / "punching_press_two_way.toml"
@@ -104,10 +105,11 @@ def test_changes_are_those_of_single_runs(make_model: Callable[..., Model], tmp_
         assert found.error[name] == pytest.approx(abs(found.change[name]), abs=1e-4)
     assert found.change[PEAK] < -0.1  # the paper's model is too low
     assert ("times as fast" in found.words) == (found.gain >= 1.0)  # which, depends on the machine's other work
-    rows = found.report().parts[0].rows
-    assert np.shape(rows) == (2, 6)
-    speeds = next(row for row in rows if row[0] == "rms:inner.vy")
-    assert (speeds[1], float(speeds[2])) == ("mm/s", pytest.approx(1e3 * found.values["rms:inner.vy"], rel=1e-3))
+    table = found.report().parts[0]
+    assert isinstance(table, ReportTable)
+    assert np.shape(table.rows) == (2, 6)
+    speeds = next(row for row in table.rows if row[0] == "rms:inner.vy")
+    assert (speeds[1], float(str(speeds[2]))) == ("mm/s", pytest.approx(1e3 * found.values["rms:inner.vy"], rel=1e-3))
     assert found.meanings["rms:inner.vy"].startswith("Velocity of the centre of the inner ring along y")
     assert found.to_json()["simplification"]["units"] == {PEAK: "N", "rms:inner.vy": "m/s"}
     # life is counted in turns, of a variant whose outputs do not name the ball force as well

@@ -18,12 +18,13 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.summary import add_turns, summarize
 from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.app.summary_words import stands_out
+from ballpass.runtime.ask.peaks import steady_run
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.report.html import table_html
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.text import show, table_text
-from ballpass.runtime.solution.settle import look_further
+from ballpass.runtime.solution.settle import look_beyond
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -263,7 +264,9 @@ def test_a_run_with_some_outputs_has_the_summary_of_these(
     # states are there without being asked for
     assert found["inner.y"] == summary["inner.y"]
     assert "reaction.A.x" not in found
-    longer = look_further(model, model.numbers(), run)
+    own = steady_run(model, model.numbers(), run)
+    assert own is not None
+    longer = look_beyond(own, run.steady_reductions)
     assert longer is not None
     assert "highest ball force" in add_turns(found, longer, model.manifest, instead=False)[0]
     render_summary(found, model.manifest)

@@ -116,6 +116,16 @@ def has_quantities(solution: Solution, name: str, model: LoadedModel) -> bool:
     return name not in model.states and (solution.statistics.method in STEPPERS or _is_of_time(model, name))
 
 
+def steady_run(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run | None:
+    """The run that a solution is of, from the time on that counts to its end; None where the project's own stepper did
+    not reduce it, or nothing turns."""
+    few, runs = solution.steady_reductions, solution.statistics.steps and len(solution)
+    if few is None or solution.cycle_length is None or not runs:
+        return None
+    run = run_of(model, numbers, solution)
+    return replace(run, span=replace(run.span, start=few.start, transient=solution.transient_cycles))
+
+
 def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
     """The run that a solution is of, from its first sample to its last."""
     statistics = solution.statistics

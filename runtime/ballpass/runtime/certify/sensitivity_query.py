@@ -336,8 +336,8 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities) 
     signals = ChannelValues(model, [*names, *([state] if state else [])]).along(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
-    known = timeline.crank_angles(manifest, numbers.values, times)
-    angles = past(signals[state].value[order, 0]) if state else known
+    turned = timeline.driver(manifest, numbers.values).at(times)[0] % TURN
+    angles = past(signals[state].value[order, 0]) if state else turned
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

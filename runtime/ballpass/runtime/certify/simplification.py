@@ -85,15 +85,22 @@ class Simplification(Reported):
         )
 
     def _report(self) -> Report:
-        heads = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
-        rows = []
-        for name in self.quantities:
-            factor, unit = table_unit(self.units[name])
-            both = (rounded(factor * values[name]) for values in (self.values, self.simpler_values))
-            rows.append((name, unit, *both, f"{100.0 * self.change[name]:+z.3g} %", percent(self.error[name])))
-        title = f"{self.title}; other: {self.simpler_title}"
-        meanings = "\n".join(f"{name}: {words}" for name, words in self.meanings.items())
-        table = ReportTable(title=title, heads=heads, rows=rows, right=heads[2:], caption=meanings)
+        def shown(values: Mapping[str, float], name: str) -> str:
+            return rounded(table_unit(self.units[name])[0] * values[name])
+
+        table = ReportTable.of(
+            self.quantities,
+            {
+                "quantity": str,
+                "unit": lambda name: table_unit(self.units[name])[1],
+                ">this scene": lambda name: shown(self.values, name),
+                ">other": lambda name: shown(self.simpler_values, name),
+                ">change": lambda name: f"{100.0 * self.change[name]:+z.3g} %",
+                f">{PROMISED:.0%} within": lambda name: percent(self.error[name]),
+            },
+            title=f"{self.title}; other: {self.simpler_title}",
+            caption="\n".join(f"{name}: {words}" for name, words in self.meanings.items()),
+        )
         facts = {"simplification": {**asdict(self), "gain": self.gain}, "words": self.words}
         return Report(parts=(table, self.words), facts=facts)
 

@@ -252,8 +252,9 @@ class FitAnswer(ShortRepr, Reported):
             for one in self.signals
             if one.axis == "quantity" and one.noise > FAR
         ]
+        records = [asdict(one) for one in self.numbers]
         facts = {
-            "numbers": [asdict(one) for one in self.numbers],
+            "numbers": records,
             "correlations": self.correlations.tolist(),
             "undetermined": [asdict(one) for one in self.undetermined],
             "signals": [
@@ -272,7 +273,6 @@ class FitAnswer(ShortRepr, Reported):
         fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."
         if nothing:
             fault = f"The model explains nothing of {', '.join(nothing)}: no number of this fit can be relied on."
-        records = [asdict(one) for one in self.numbers]
         return Report(parts=(table, *said), facts=facts, records=records, index=("name",), warnings=warned, fault=fault)
 
 

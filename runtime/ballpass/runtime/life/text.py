@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 
-from ballpass.runtime.life.records import BearingStrength, DutyLife, StateStrength
+from ballpass.runtime.life.records import BearingStrength, DutyLife, RingStrength, StateStrength
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION
 from ballpass.runtime.ratings.wear import COEFFICIENTS
@@ -70,24 +70,16 @@ class LifeReport(Reported):
         return any(bearing.life is not None for state in self.states for bearing in state.bearings)
 
     def _report(self) -> Report:
-        facts = asdict(self)
+        facts, records = asdict(self), []
         for state, plain in zip(self.states, facts["states"], strict=True):
             for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
                 entry["hours"] = None if bearing.life is None else bearing.hours(bearing.life)
+                lives = {name: math.nan if entry[name] is None else entry[name] for name in ("life", "hours")}
+                forces = {name: entry[name] for name in ("peak_force", "static_safety")}
+                pressure = max(bearing.inner.peak_pressure, bearing.outer.peak_pressure)
+                names = {"state": state.name, "bearing": bearing.name}
+                records.append(names | lives | forces | {"peak_pressure": pressure})
         facts["wear_coefficients"] = list(COEFFICIENTS)
-        records = [
-            {
-                "state": state.name,
-                "bearing": bearing.name,
-                "life": math.nan if bearing.life is None else bearing.life,
-                "hours": math.nan if bearing.life is None else bearing.hours(bearing.life),
-                "peak_force": bearing.peak_force,
-                "static_safety": bearing.static_safety,
-                "peak_pressure": max(bearing.inner.peak_pressure, bearing.outer.peak_pressure),
-            }
-            for state in self.states
-            for bearing in state.bearings
-        ]
         swinging = [bearing.why_no_life for state in self.states for bearing in state.bearings if bearing.why_no_life]
         return Report(
             title=f"{self.title}: strength and life of its bearings",
@@ -149,26 +141,23 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
     at = f"{bearing.peak_time:.5g} s"
     if bearing.peak_angle is not None:
         at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
-    rows: list[tuple[str, ...]] = [
-        ("peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
-        (element.contact_words, *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
-    ]
+    rows: dict[str, Callable[[RingStrength], str]] = {
+        "peak pressure": lambda ring: f"{ring.peak_pressure / 1e6:.0f} MPa",
+        element.contact_words: lambda ring: f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm",
+    }
     if not bearing.why_no_life:
-        rows += [
-            (f"equivalent {element.noun} load", *(_force(ring.equivalent_load) for ring in rings)),
-            ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
-            ("share of the damage", *(f"{100.0 * sum(ring.damage):.0f} %" for ring in rings)),
-        ]
+        rows |= {
+            f"equivalent {element.noun} load": lambda ring: _force(ring.equivalent_load),
+            "place of the most damage": lambda ring: f"{math.degrees(ring.worst_angle):.0f} deg",
+            "share of the damage": lambda ring: f"{100.0 * sum(ring.damage):.0f} %",
+        }
     if any(ring.wear[1] > 0.0 for ring in rings):  # a straight roller does not slip
-        rows += [
-            ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
-            ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
-            ("deepest wear, angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
-            (
-                f"deepest wear, distance from the {element.middle}",
-                *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings),
-            ),
-        ]
+        rows |= {
+            "deepest wear, lowest wear coefficient": lambda ring: _wear(ring.wear[0]),
+            "deepest wear, highest wear coefficient": lambda ring: _wear(ring.wear[1]),
+            "deepest wear, angle": lambda ring: f"{math.degrees(ring.wear_angle):.0f} deg",
+            f"deepest wear, distance from the {element.middle}": lambda ring: f"{1e3 * ring.wear_across:.2f} mm",
+        }
     parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
         f"  {_verdict(bearing)}",
@@ -177,8 +166,13 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         f"static C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
         f"fatigue limit C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', element.limit_words)})",
         f"  highest {element.noun} force {_force(bearing.peak_force)}: {element.noun} {bearing.peak_ball}, {at}",
-        ReportTable(
-            heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring"), wrapped=("",)
+        ReportTable.of(
+            rows.items(),
+            {
+                "~": lambda row: row[0],
+                ">inner ring": lambda row: row[1](bearing.inner),
+                ">outer ring": lambda row: row[1](bearing.outer),
+            },
         ),
     ]
     if bearing.tilt is not None:
@@ -223,9 +217,8 @@ def _duty_parts(life: DutyLife) -> _Parts:
 
 def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
     """Lives in turns and hours."""
-    heads = ("life", "million turns", "hours")
-    rows = [(name, *_life(*life)) for name, life in lives.items()]
-    return ReportTable(heads=heads, rows=rows, right=heads[1:], wrapped=heads[:1])
+    columns = {"~life": lambda row: row[0], ">million turns": lambda row: row[1][0], ">hours": lambda row: row[1][1]}
+    return ReportTable.of([(name, _life(*life)) for name, life in lives.items()], columns)
 
 
 def _life(turns: float, spent: float) -> tuple[str, str]:

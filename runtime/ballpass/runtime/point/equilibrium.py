@@ -122,26 +122,18 @@ class StaticEquilibrium(Reported):
     def _report(self) -> Report:
         positions = dict(zip(self.coordinates, self.positions.tolist(), strict=True))
         forces = zip(self.deflection.tolist(), self.ball_force.tolist(), strict=True)
-        balls = [
-            {"ball": k + 1, "deflection": deflection, "elastic_force": force}
-            for k, (deflection, force) in enumerate(forces)
-        ]
-        right = ("position or deflection, µm", "elastic force, N")
-        table = ReportTable(
-            title=f"Static equilibrium at t = {self.time:.6g} s",
-            heads=(f"position or {self._noun}", *right),
-            rows=[
-                *((name, f"{1e6 * q:z.6g}") for name, q in self._found.items()),
-                *(
-                    (
-                        f"{self._noun} {ball['ball']}",
-                        f"{1e6 * ball['deflection']:z.6g}",
-                        f"{ball['elastic_force']:z.6g}",
-                    )
-                    for ball in balls
-                ),
+        balls = [{"ball": k, "deflection": d, "elastic_force": force} for k, (d, force) in enumerate(forces, 1)]
+        table = ReportTable.of(
+            [
+                *((name, q, None) for name, q in self._found.items()),
+                *((f"{self._noun} {ball['ball']}", ball["deflection"], ball["elastic_force"]) for ball in balls),
             ],
-            right=right,
+            {
+                f"position or {self._noun}": lambda row: row[0],
+                ">position or deflection, µm": lambda row: f"{1e6 * row[1]:z.6g}",
+                ">elastic force, N": lambda row: "" if row[2] is None else f"{row[2]:z.6g}",
+            },
+            title=f"Static equilibrium at t = {self.time:.6g} s",
             caption=f"load {', '.join(f'{part:z.6g} N' for part in self.load)}; net force left {self.residual:.2g} N",
         )
         facts = {"time": self.time, "load": self.load, "positions": positions, "balls": balls}

@@ -141,33 +141,21 @@ class Explanation(ShortRepr, Reported):
             Marked(f"Breakpoints of the first {first}", "head", f": {where}"),
             Marked("Smoothness of the contact laws", "head", f": {laws}"),
         ]
-        right = (
-            "crank or\nshaft angle",
-            "fastest\ndecay",
-            "fastest\nfrequency",
-            "slowest\nrate",
-            "decay over\nfrequency",
-        )
-        rows = [
-            (
-                item.name if item.time < repeats else f"{item.name}, {item.time:.4g} s",
-                f"{math.degrees(item.angle):.0f}°",
-                f"{rounded(item.decay, 3)} 1/s",
-                f"{rounded(item.frequency / math.tau, 3)} Hz",
-                f"{rounded(item.slowest, 3)} 1/s",
-                f"{item.stiffness:.2g}" if math.isfinite(item.stiffness) else "",
-            )
-            for item in self.scales
-        ]
-        table = ReportTable(
+        table = ReportTable.of(
+            self.scales,
+            {
+                "at": lambda item: item.name if item.time < repeats else f"{item.name}, {item.time:.4g} s",
+                ">crank or\nshaft angle": lambda item: f"{math.degrees(item.angle):.0f}°",
+                ">fastest\ndecay": lambda item: f"{rounded(item.decay, 3)} 1/s",
+                ">fastest\nfrequency": lambda item: f"{rounded(item.frequency / math.tau, 3)} Hz",
+                ">slowest\nrate": lambda item: f"{rounded(item.slowest, 3)} 1/s",
+                ">decay over\nfrequency": lambda item: f"{item.stiffness:.2g}" if math.isfinite(item.stiffness) else "",
+            },
             title="Time scales of small motions",
-            heads=("at", *right),
-            rows=rows,
-            right=right,
             caption="Decay over frequency, with 2π: of a single mode, up to 1, its damping ratio; above 3 decay bounds "
             "explicit steps.",
         )
-        parts += ["", table] if rows else []
+        parts += ["", table] if self.scales else []
         parts += [f"no equilibrium at {place}" for place in self.unsupported]
         parts += ["", Marked("Method", "head", f": auto takes {self.method}, {self.reason}")]
         parts += [Marked("Unusual", "doubt", f": {words}") for words in self.unusual]
@@ -176,14 +164,12 @@ class Explanation(ShortRepr, Reported):
             asdict(item) | {"angle_deg": math.degrees(item.angle), "stiffness": item.stiffness} for item in self.scales
         ]
         facts = {
-            "states": self.states,
-            "outputs": self.outputs,
+            **self._named("states", "outputs"),
             "breakpoints": [
                 {"time": item.time, "angle_deg": math.degrees(item.angle), "cause": item.cause}
                 for item in self.breakpoints
             ],
-            "turn": self.turn,
-            "turns": self.turns,
+            **self._named("turn", "turns"),
             "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in self.smoothness],
             "time_scales": scales,
             "without_equilibrium": self.unsupported,

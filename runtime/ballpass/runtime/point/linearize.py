@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -152,18 +152,9 @@ class Linearization(Reported):
         return self.to_json()
 
     def _report(self) -> Report:
-        modes, faster = (
-            [
-                {
-                    "natural_frequency": mode.natural_frequency,
-                    "damped_frequency": mode.damped_frequency,
-                    "damping_ratio": mode.damping_ratio,
-                }
-                for mode in found
-            ]
-            for found in (self.modes, self.faster_modes)
-        )
-        units = {"natural_frequency": "Hz", "damped_frequency": "Hz", "damping_ratio": "1"}
+        def numbers(mode: Mode) -> dict[str, Any]:
+            return {name: {"value": getattr(mode, name), "unit": unit} for name, unit in _UNITS.items()}
+
         facts = {
             "time": {"value": self.time, "unit": "s"},
             "at_equilibrium": self.at_equilibrium,
@@ -175,19 +166,18 @@ class Linearization(Reported):
             "modes": [
                 {
                     "eigenvalue": [mode.eigenvalue.real, mode.eigenvalue.imag],
-                    **{name: {"value": value, "unit": units[name]} for name, value in numbers.items()},
+                    **numbers(mode),
                     "shape": [[z.real, z.imag] for z in mode.shape.tolist()],
                 }
-                for mode, numbers in zip(self.modes, modes, strict=True)
+                for mode in self.modes
             ],
             "passing": {"value": self.passing, "unit": "m/s"},
-            "faster_modes": [
-                {name: {"value": value, "unit": units[name]} for name, value in numbers.items()} for numbers in faster
-            ],
+            "faster_modes": list(map(numbers, self.faster_modes)),
             "notes": list(self.notes),
         }
         tables = (_modes_table(self), *_faster_table(self), _matrices_table(self))
-        return Report(parts=tables, facts=facts, records=modes)
+        records = [{name: getattr(mode, name) for name in _UNITS} for mode in self.modes]
+        return Report(parts=tables, facts=facts, records=records)
 
 
 def linearize(
@@ -345,29 +335,27 @@ def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
     return tuple(notes)
 
 
-#: Heads of columns of a mode.
-_FREQUENCIES = ("natural\n[Hz]", "damped\n[Hz]", "damping\nratio")
+#: Numbers of a mode, and their columns.
+_UNITS = {"natural_frequency": "Hz", "damped_frequency": "Hz", "damping_ratio": "1"}
+_COLUMNS: dict[str, Callable[[Mode], str]] = {
+    ">natural\n[Hz]": lambda mode: f"{mode.natural_frequency:.6g}",
+    ">damped\n[Hz]": lambda mode: f"{mode.damped_frequency:.6g}",
+    ">damping\nratio": lambda mode: "" if mode.rigid else f"{mode.damping_ratio:.4g}",
+}
 
 
 def _modes_table(result: Linearization) -> ReportTable:
     where = "static equilibrium" if result.at_equilibrium else "given state"
     words = "Damping ratio: over critical damping. Shapes: size and phase of each coordinate, the largest 1."
     coordinates = names_in_words(dict(zip(result.coordinates, result.descriptions, strict=True)))
-    heads = (*_FREQUENCIES, *map(head_lines, result.coordinates))
-    rows = [
-        (
-            f"{mode.natural_frequency:.6g}",
-            f"{mode.damped_frequency:.6g}",
-            "" if mode.rigid else f"{mode.damping_ratio:.4g}",
-            *map(_polar, mode.shape.tolist()),
-        )
-        for mode in result.modes
-    ]
-    return ReportTable(
+    shapes: dict[str, Callable[[Mode], str]] = {
+        f">{head_lines(name)}": lambda mode, k=k: _polar(complex(mode.shape[k]))  # type: ignore[misc]
+        for k, name in enumerate(result.coordinates)
+    }
+    return ReportTable.of(
+        result.modes,
+        _COLUMNS | shapes,
         title=f"Small vibrations about the {where} at t = {result.time:.6g} s",
-        heads=heads,
-        rows=rows,
-        right=heads,
         caption="\n".join((words, coordinates, *result.notes)),
     )
 
@@ -376,13 +364,8 @@ def _faster_table(result: Linearization) -> tuple[ReportTable, ...]:
     """Frequencies and ratios of vibrations faster than the balls pass, where they are others."""
     if not result.faster_modes:
         return ()
-    heads = _FREQUENCIES
-    rows = [
-        (f"{m.natural_frequency:.6g}", f"{m.damped_frequency:.6g}", "" if m.rigid else f"{m.damping_ratio:.4g}")
-        for m in result.faster_modes
-    ]
     title = f"The same in vibrations faster than {result.passing:.2g} m/s"
-    return (ReportTable(title=title, heads=heads, rows=rows, right=heads),)
+    return (ReportTable.of(result.faster_modes, _COLUMNS, title=title),)
 
 
 def _polar(z: complex) -> str:

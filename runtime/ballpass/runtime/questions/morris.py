@@ -80,23 +80,22 @@ class MorrisAnswer(DrawnAnswer):
         parts, records = [], []
         for one in self.quantities:
             ranked = sorted(zip(self.inputs, one.effects, strict=True), key=lambda pair: -pair[1].size)
-            right = ("size", "mean", "deviation")
             factor, unit = table_unit(one.unit)
+
+            def shown(number: float, factor: float = factor) -> str:
+                return f"{factor * number:.4g}"
+
             parts.append(
-                ReportTable(
+                ReportTable.of(
+                    ranked,
+                    {
+                        "input": lambda row: row[0],
+                        ">size": lambda row: shown(row[1].size),
+                        "95 % interval": lambda row: f"{shown(row[1].size_low)} to {shown(row[1].size_high)}",
+                        ">mean": lambda row: shown(row[1].mean),
+                        ">deviation": lambda row: shown(row[1].deviation),
+                    },
                     title=f"Effects on {one.name} [{unit}]",
-                    heads=("input", "size", "95 % interval", "mean", "deviation"),
-                    rows=[
-                        (
-                            name,
-                            f"{factor * effect.size:.4g}",
-                            f"{factor * effect.size_low:.4g} to {factor * effect.size_high:.4g}",
-                            f"{factor * effect.mean:.4g}",
-                            f"{factor * effect.deviation:.4g}",
-                        )
-                        for name, effect in ranked
-                    ],
-                    right=right,
                     caption="Changes over the whole of an input's distribution; size: mean without signs. A deviation "
                     "near the size: the input acts together with others, or not linearly.",
                 )

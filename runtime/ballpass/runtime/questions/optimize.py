@@ -189,21 +189,19 @@ class Optimum(ShortRepr, Reported):
             for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
         ]
         factor, unit = table_unit(self.unit)
-        table = ReportTable(
+        table = ReportTable.of(
+            zip(self.vary, rows, strict=True),
+            {
+                "parameter": lambda row: row[0].name,
+                ">value": lambda row: f"{row[1]['value'] / row[0].factor:.8g}",
+                "unit": lambda row: printed_unit(row[0].shown_unit),
+                "held by": lambda row: f"{row[1]['bound']} end" if row[1]["bound"] else "",
+                f"slope [{unit} per that unit]": lambda row: ", ".join(
+                    f"{factor * row[0].factor * slope:.5g}" for slope in row[1]["slopes"]
+                ),
+            },
             title=f"{self._most.capitalize()} {'worst ' if self.tolerances else ''}{self.goal}: "
             f"{factor * self.value:.9g} {unit}",
-            heads=("parameter", "value", "unit", "held by", f"slope [{unit} per that unit]"),
-            rows=[
-                (
-                    one.name,
-                    f"{value / one.factor:.8g}",
-                    printed_unit(one.shown_unit),
-                    f"{bound} end" if bound else "",
-                    ", ".join(f"{factor * one.factor * slope:.5g}" for slope in self.slopes[:, k]),
-                )
-                for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
-            ],
-            right=("value",),
         )
         said = []
         if any(self.bounds):

@@ -9,9 +9,9 @@ driver is then a function of where the balls stand: a closed curve, which is fit
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -127,7 +127,7 @@ class PoincareSection(ShortRepr, Reported):
 
     def _report(self) -> Report:
         missed = self.curve.missed if self.curve is not None else np.full(len(self.names), math.nan)
-        records = [
+        records: list[dict[str, Any]] = [
             {
                 "state": name,
                 "unit": unit,
@@ -138,29 +138,18 @@ class PoincareSection(ShortRepr, Reported):
             for name, unit, column, share in zip(self.names, self.units, self.states.T, missed, strict=True)
         ]
         fitted = self.curve is not None
-        table = ReportTable(
+        off: dict[str, Callable[[Any], str]] = {">off curve": lambda row: f"{rounded(100.0 * row[0]['missed'], 2)} %"}
+        table = ReportTable.of(
+            zip(records, map(table_unit, self.units), self.descriptions, strict=True),
+            {
+                "state": lambda row: row[0]["state"],
+                ">least": lambda row: f"{row[1][0] * row[0]['least']:z.6g}",
+                ">largest": lambda row: f"{row[1][0] * row[0]['largest']:z.6g}",
+                "unit": lambda row: row[1][1],
+                **(off if fitted else {}),
+                "~what": lambda row: short_words(row[2]),
+            },
             title=f"{len(self.states)} points, {self.often}, at {self.angle:g} deg: {self.kind}",
-            heads=("state", "least", "largest", "unit", *(("off curve",) if fitted else ()), "what"),
-            rows=[
-                (
-                    name,
-                    f"{factor * column.min():z.6g}",
-                    f"{factor * column.max():z.6g}",
-                    shown_unit,
-                    *((f"{rounded(100.0 * share, 2)} %",) if fitted else ()),
-                    short_words(description),
-                )
-                for name, (factor, shown_unit), column, share, description in zip(
-                    self.names,
-                    map(table_unit, self.units),
-                    self.states.T,
-                    missed.tolist(),
-                    self.descriptions,
-                    strict=True,
-                )
-            ],
-            right=("least", "largest", "off curve")[: 3 if fitted else 2],
-            wrapped=("what",),
         )
         parts: list[str | ReportTable] = [table, f"Motion: {self.motion}, read {self.every}."]
         if self.curve is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -205,34 +205,25 @@ class SignalSpectrum(ShortRepr, Reported):
         infos = (*self.solution.manifest.states, *self.solution.manifest.outputs)
         words = next((info.description for info in infos if info.name == self.of), "")
         factor, height_unit = table_unit(self.height_unit)
-        height = f"{self.scaling} [{height_unit}]"
-        table = ReportTable(
-            title=f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}",
-            heads=(across, height, "line"),
-            rows=[
-                (f"{self.position[k]:.6g}", f"{factor * self.height[k]:.4g}", name)
-                for k, name in zip(self.highest, self.names, strict=True)
-            ],
-            right=(across, height),
-        )
-        at_marks = ReportTable(
-            title="Heights at the characteristic lines",
-            heads=(across, height, "line"),
-            rows=[
-                (f"{mark.frequency:.6g}", "" if math.isnan(own) else f"{factor * own:.4g}", mark.label)
-                for mark, own in zip(self.marks, self.mark_heights, strict=True)
-            ],
-            right=(across, height),
-        )
+        columns: dict[str, Callable[[tuple[float, float, str]], str]] = {
+            f">{across}": lambda line: f"{line[0]:.6g}",
+            f">{self.scaling} [{height_unit}]": lambda line: "" if math.isnan(line[1]) else f"{factor * line[1]:.4g}",
+            "line": lambda line: line[2],
+        }
+        highest = zip(self.position[list(self.highest)], self.height[list(self.highest)], self.names, strict=True)
+        title = f"Highest lines of {self.of}{': ' if words else ''}{words[:1].lower()}{words[1:]}"
+        table = ReportTable.of(highest, columns, title=title)
+        marks = [(mark.frequency, own, mark.label) for mark, own in zip(self.marks, self.mark_heights, strict=True)]
+        at_marks = ReportTable.of(marks, columns, title="Heights at the characteristic lines")
         s = self.statistics
         said = [f"lines of the spectrum are {self.resolution:.3g}{'' if self.orders else ' Hz'} apart", *self.notes]
         names = dict.fromkeys(mark.name for mark in self.marks)
         abbreviated = "; ".join(f"{name}: {MEANINGS[name]}" for name in names if name in MEANINGS)
         abbreviated = bearing_words(abbreviated, self.solution.manifest.bearings)
         said += [abbreviated] if abbreviated else []
-        factor, shown = table_unit(self.unit)
+        times, shown = table_unit(self.unit)
         said.append(
-            f"rms {factor * s.rms:.4g} {shown}, peak {factor * s.peak:.4g} {shown}, crest factor {s.crest_factor:.3g}, "
+            f"rms {times * s.rms:.4g} {shown}, peak {times * s.peak:.4g} {shown}, crest factor {s.crest_factor:.3g}, "
             f"kurtosis {s.kurtosis:.3g}, skewness {s.skewness:.3g}"
         )
         if self.scaling != "density" and (low := _lowest_reading(self.window)) < LEAST_READING:
@@ -246,13 +237,7 @@ class SignalSpectrum(ShortRepr, Reported):
             chosen = "" if self.kurtosis is None else f", chosen by its kurtosis of {self.kurtosis:.3g}"
             said.append(f"envelope of {low:.5g} to {high:.5g} Hz{chosen}")
         facts = {
-            "of": self.of,
-            "unit": self.unit,
-            "window": self.window,
-            "scaling": self.scaling,
-            "envelope": self.envelope,
-            "kurtosis": self.kurtosis,
-            "resolution": self.resolution,
+            **self._named("of", "unit", "window", "scaling", "envelope", "kurtosis", "resolution"),
             "statistics": asdict(s),
             "characteristic": [
                 asdict(mark) | {self.scaling: own} for mark, own in zip(self.marks, self.mark_heights, strict=True)

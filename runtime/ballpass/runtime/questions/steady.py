@@ -188,21 +188,15 @@ class SteadyState(ShortRepr, Reported):
         ]
         turns = "" if math.isnan(self.turns) else f", {self.turns:.10g} turns"
         begin = f"{self.begin:.10g} s" if self.begin else "0"
-        table = ReportTable(
+        table = ReportTable.of(
+            zip(rows, map(table_unit, self.units), self.descriptions, strict=True),
+            {
+                "state": lambda row: row[0]["state"],
+                ">start": lambda row: f"{row[1][0] * row[0]['start']:z.10g}",
+                "unit": lambda row: row[1][1],
+                "~what": lambda row: short_words(row[2]),
+            },
             title=f"State at t = {begin} that repeats after {self.period:.10g} s{turns}",
-            heads=("state", "start", "unit", "what"),
-            rows=[
-                (name, f"{factor * start:z.10g}", shown_unit, short_words(description))
-                for name, (factor, shown_unit), start, description in zip(
-                    self.states,
-                    map(table_unit, self.units),
-                    self.start.tolist(),
-                    self.descriptions,
-                    strict=True,
-                )
-            ],
-            right=("start",),
-            wrapped=("what",),
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
         lost = len(self.multipliers) - len(known)

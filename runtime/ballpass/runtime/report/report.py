@@ -5,9 +5,11 @@ In: nothing but text and numbers.  Out: `Report`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
+
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,30 @@ class ReportTable:
     right: Collection[str] = ()
     wrapped: Collection[str] = ()
     sections: Collection[int] = ()
+
+    @classmethod
+    def of(cls, items: Iterable[_Item], columns: Mapping[str, Callable[[_Item], Words]], **rest: Any) -> ReportTable:
+        """A row for each item.
+
+        Parameters
+        ----------
+        columns : text of an item by the column's head; a head behind ">" is aligned to the right, behind "~" wrapped
+        rest : title, caption, sections
+
+        Examples
+        --------
+        >>> table = ReportTable.of([1.5, 2.5], {"load": str, ">twice [N]": lambda load: f"{2.0 * load:g}"})
+        >>> table.heads, table.rows[1], table.right
+        (('load', 'twice [N]'), ('2.5', '5'), ('twice [N]',))
+        """
+        heads = {sign: tuple(head[1:] for head in columns if head[:1] == sign) for sign in ">~"}
+        return cls(
+            heads=tuple(head.lstrip(">~") for head in columns),
+            rows=[tuple(text(item) for text in columns.values()) for item in items],
+            right=heads[">"],
+            wrapped=heads["~"],
+            **rest,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,20 +18,16 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol, TypeVar
 
-import numpy as np
-
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
-from ballpass.runtime.request.start import state_at
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
-from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time.repetition import MOST_RUN, Repetition
 from ballpass.runtime.time.span import Span
 
@@ -44,7 +40,7 @@ START = 5e-2
 #: Steady turns that are compared with twice as many at first.
 LEAST = 64
 
-#: Steps that `look_further` may take beside a run: some tenth of a second.
+#: Steps that `look_beyond` may take beside a run: some tenth of a second.
 STEPS = 100_000
 
 
@@ -179,32 +175,6 @@ def doubled(span: Span, turns: float, most: float) -> Iterator[float]:
     while turns <= most:
         yield span.counting(turns).end
         turns *= 2
-
-
-def look_further(model: LoadedModel, numbers: Numbers, solution: Solution, turns: int | None = None) -> Settled | None:
-    """`look_beyond` of a run that is done; None where another method than the project's own stepper ran.
-
-    Parameters
-    ----------
-    turns : in place of those that `STEPS` steps reach
-
-    Raises
-    ------
-    SimulationError
-        The longer run failed.
-    """
-    few, statistics = solution.steady_reductions, solution.statistics
-    if few is None or solution.cycle_length is None or not statistics.steps:
-        return None
-    request = Request(
-        duration=statistics.duration,
-        transient_cycles=solution.transient_cycles,
-        method=statistics.method,
-        rtol=statistics.rtol,
-        kinks=statistics.kinks,
-        initial=state_at(model, numbers, statistics.begin, np.array(statistics.initial)),
-    )
-    return look_beyond(resolve(model, numbers, request), few, turns)
 
 
 def reduced(run: Run) -> Reductions:

@@ -143,11 +143,6 @@ def crank_angle(manifest: Manifest, values: Values, t: float, state: np.ndarray 
     return float(driver(manifest, values).at(t)[0]) % TURN
 
 
-def crank_angles(manifest: Manifest, values: Values, times: np.ndarray) -> np.ndarray:
-    """The same at many times, of a driver whose angle is known, in the shape of `times` [rad]."""
-    return np.asarray(driver(manifest, values).at(times)[0] % TURN)
-
-
 def held_states(manifest: Manifest, values: Values, t: float) -> np.ndarray:
     """States that no equilibrium decides, all else zero, shape (states,): those of a free driver at its start, lags."""
     names = [info.name for info in manifest.states]

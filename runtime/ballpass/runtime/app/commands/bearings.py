@@ -32,23 +32,22 @@ def bearings(
         if json_:
             show_json({"bearings": found})
             return
-        heads = ("bearing", "d", "D", "B", "balls", "D_w", "D_pw", "C_r", "C_0r", "C_u", "CN")
-        rows = [
-            (
-                row["designation"],
-                *(f"{1e3 * row[key]:g}" for key in ("bore", "outside_diameter", "width")),
-                str(row["balls"]),
-                *(f"{1e3 * row[key]:.4g}" for key in ("ball_diameter", "pitch_diameter")),
-                *(f"{1e-3 * row[key]:.3g}" for key in ("dynamic_rating", "static_rating", "fatigue_limit")),
-                "–".join(f"{1e6 * end:.0f}" for end in row["clearance"]["CN"]),
-            )
-            for row in found
-        ]
-        table = ReportTable(
+        table = ReportTable.of(
+            found,
+            {
+                "bearing": lambda row: row["designation"],
+                ">d": lambda row: f"{1e3 * row['bore']:g}",
+                ">D": lambda row: f"{1e3 * row['outside_diameter']:g}",
+                ">B": lambda row: f"{1e3 * row['width']:g}",
+                ">balls": lambda row: str(row["balls"]),
+                ">D_w": lambda row: f"{1e3 * row['ball_diameter']:.4g}",
+                ">D_pw": lambda row: f"{1e3 * row['pitch_diameter']:.4g}",
+                ">C_r": lambda row: f"{1e-3 * row['dynamic_rating']:.3g}",
+                ">C_0r": lambda row: f"{1e-3 * row['static_rating']:.3g}",
+                ">C_u": lambda row: f"{1e-3 * row['fatigue_limit']:.3g}",
+                ">CN": lambda row: "–".join(f"{1e6 * end:.0f}" for end in row["clearance"]["CN"]),
+            },
             title="Bearings (mm, kN; clearance in µm)",
-            heads=heads,
-            rows=rows,
-            right=heads[1:],
             caption="d: bore, D: outside diameter, B: width; D_w: ball diameter, D_pw: pitch diameter.\n"
             "C_r, C_0r: dynamic and static load rating, C_u: fatigue limit; CN: normal clearance, diametral.\n"
             "Balls or rollers, D_w, D_pw: derived from ratings of a catalogue.\n"

@@ -256,9 +256,9 @@ def _answer(
     from ballpass.runtime.app.summary_table import render_quantities, render_summary
     from ballpass.runtime.app.summary_words import stands_out
     from ballpass.runtime.app.transient_words import transient_words
-    from ballpass.runtime.ask.peaks import run_of
+    from ballpass.runtime.ask.peaks import steady_run
     from ballpass.runtime.report.report import Report
-    from ballpass.runtime.solution.settle import look_further
+    from ballpass.runtime.solution.settle import look_beyond
 
     taken, said = solution.statistics, list[str]()
     numbers = model.numbers(given["parameters"])
@@ -269,11 +269,9 @@ def _answer(
         longer = model.settle(**start, **same, transient=length["transient"], progress=stages.fraction)
         said += [] if longer.settled else [longer.words]
     else:
-        longer = look_further(model, numbers, solution, *(first.turns for first in turned))
-        if longer is not None:
-            own = run_of(model, numbers, solution)
-            counted = replace(own.span, start=longer.reductions.start, transient=solution.transient_cycles)
-            own = replace(own, span=counted)
+        own = steady_run(model, numbers, solution)
+        longer = None if own is None else look_beyond(own, solution.steady_reductions, *(one.turns for one in turned))
+        if own is not None and longer is not None:
             said += transient_words(model, own, longer, asked=_said(length))
     summary = summarize(model, solution)
     parts: list[Words | ReportTable] = []
