@@ -20,7 +20,7 @@ from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.breakpoints import breakpoints
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, Turning
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
 LARGEST_PHASE = 1e6
@@ -155,7 +155,7 @@ def check_count(manifest: Manifest, numbers: Numbers, length: float, turn: float
     RequestError
         They would not fit.
     """
-    rates = {info.name: timeline.fastest(info, numbers.values) for info in manifest.turnings}
+    rates = {info.name: Turning.of(info, numbers.values).fastest for info in manifest.turnings}
     fastest = float(max(rates.values(), default=0.0))
     count = 1.0 + length / turn + length * fastest / LARGEST_PHASE
     for item in manifest.inputs:

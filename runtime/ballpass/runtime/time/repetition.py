@@ -110,12 +110,12 @@ class Repetition:
             Times or angles of a table do not increase.
         """
         driver, settled = timeline.driver(manifest, values), {**values, **timeline.settled_rates(manifest, values)}
-        speed = abs(float(driver.rate[-1]))
+        speed, tables = abs(float(driver.rate[-1])), _tables(manifest, values)
         return cls(
             driver=driver,
-            turns=_turns(manifest, values),
+            turns=math.lcm(1, *(turns for _, turns in tables)),
             changes=tuple(_changes(manifest, values)),
-            rates=dict(_rates(manifest, values)),
+            rates=dict(_rates(manifest, values, tables)),
             shaft=Rate(words="the shaft" if manifest.mechanism is None else "the driver", speed=speed),
             balls=tuple(_balls(manifest, settled, speed)),
         )
@@ -209,11 +209,11 @@ def alike_from_slope(manifest: Manifest, values: Values, moved: Mapping[str, flo
     return (start - timeline.angle_slope(info, values, moved, begin)) / float(Turning.of(info, values).at(begin)[1])
 
 
-def _turns(manifest: Manifest, values: Values) -> int:
-    """Turns of driver or shaft after which all loads over its angle repeat."""
-    if timeline.is_free(manifest):  # its tables are no inputs
-        return math.lcm(1, *(turns for _, turns in manifest.mechanism.turns)) if manifest.mechanism else 1
-    return math.lcm(1, *(_turns_of(item, values) for item in manifest.inputs if item.kind == "table"))
+def _tables(manifest: Manifest, values: Values) -> list[tuple[str, int]]:
+    """Of each table over an angle: its turning, and the turns after which it repeats."""
+    if manifest.mechanism is not None and timeline.is_free(manifest):  # its tables are no inputs
+        return list(manifest.mechanism.turns)
+    return [(item.turning, _turns_of(item, values)) for item in manifest.inputs if item.kind == "table"]
 
 
 def _turns_of(item: InputInfo, values: Values) -> int:
@@ -230,11 +230,10 @@ def _turns_of(item: InputInfo, values: Values) -> int:
     return item.turns
 
 
-def _rates(manifest: Manifest, values: Values) -> Iterator[tuple[TurningInfo, Rate]]:
+def _rates(manifest: Manifest, values: Values, tables: Sequence[tuple[str, int]]) -> Iterator[tuple[TurningInfo, Rate]]:
     for info in manifest.turnings:
         speed = abs(float(Turning.of(info, values).rate[-1]))
-        tables = (item for item in manifest.inputs if item.turning == info.name and item.kind == "table")
-        turns = math.lcm(1, *(_turns_of(item, values) for item in tables))
+        turns = math.lcm(1, *(several for name, several in tables if name == info.name))
         alike = [one.offset for one in manifest.turnings if one.kind == "load" and one.rate == info.rate]
         if speed:
             parts = Fraction(1, turns) if turns > 1 else Fraction(info.parts)

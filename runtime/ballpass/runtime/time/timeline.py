@@ -63,12 +63,6 @@ def driver(manifest: Manifest, values: Values) -> Turning:
     return Turning.even(0.0, 0.0) if info is None else Turning.of(info, values)
 
 
-def fastest(info: TurningInfo, values: Values) -> float:
-    """Largest rate of a turning, in either sense [rad/s]."""
-    even = not info.turns and not info.times
-    return abs(values[info.rate]) if even else Turning.of(info, values).fastest
-
-
 def mean_rates(manifest: Manifest, values: Values, begin: float, end: float) -> dict[str, float]:
     """Mean speeds over a span, by the parameters and constants that hold the first ones [rad/s]."""
     return _rates(manifest, values, lambda turning: turning.mean_rate(begin, end))
