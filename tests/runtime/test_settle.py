@@ -13,7 +13,9 @@ from typer.testing import CliRunner, Result
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.solution.settle import LEAST, MEANS, PEAKS
+from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.resolve import resolve
+from ballpass.runtime.solution.settle import LEAST, MEANS, PEAKS, changed, reduced
 
 ANGLE = "bearing.ball_angle"
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "punching_press.toml"
@@ -93,3 +95,12 @@ def test_a_ring_at_rest_has_settled(make_model: Callable[..., Model]) -> None:
     found = make_model("rotor").settle(parameters=idle, transient=50)
     assert found.settled
     assert (found.turns, found.dropped) == (128, 0)
+
+
+def test_the_angle_that_counts_turns_is_not_compared(make_model: Callable[..., Model]) -> None:
+    """It grows with every turn, and would never settle."""
+    model = make_model("punching_press_motor")
+    run = resolve(model, model.numbers(), Request(cycles=2.0, transient_cycles=1.0))
+    few = reduced(run)
+    assert model.manifest.mechanism is not None
+    assert set(few) - set(changed(run, few, few)) == {model.manifest.mechanism.angle}

@@ -249,6 +249,8 @@ def changed(run: Run, few: Reductions, many: Reductions) -> dict[str, tuple[floa
     found, tolerated = {}, _tolerated(run)
     for name, less in few.items():
         more, span, least = many[name], many[name].range, tolerated.get(name, 0.0)
+        if least == math.inf:
+            continue
         peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
         mean = abs(less.rms / more.rms - 1.0) if abs(less.rms - more.rms) > least and more.rms > 0.0 else 0.0
         found[name] = (peak / span if peak > least and span > 0.0 else 0.0, mean)
