@@ -9,20 +9,25 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.quantity.kinks import crossings, rank_differences
-from ballpass.runtime.quantity.nodes import Edges, place
-from ballpass.runtime.quantity.panels import GAUSS, interpolated, panels_between, plan_of
+from ballpass.runtime.quantity.cuts import crossings, rank_differences
+from ballpass.runtime.quantity.nodes import Cause, Cuts
+from ballpass.runtime.quantity.panels import GAUSS, cut_at, interpolated, nodes_of, whole_panels
 
 KINK = 0.8
+
+
+def one_interval(end: float) -> Cuts:
+    """From zero on, without a cut between."""
+    ends = {"cause": np.full(2, Cause.SCHEDULE), "angle": np.zeros(2, dtype=int), "slopes": np.zeros((2, 0))}
+    return Cuts(times=np.array([0.0, end]), segment=np.zeros(1, dtype=int), first=0, **ends)
 
 
 @pytest.mark.parametrize("short", [1e-2, 1e-4, 1e-8])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_short_step_at_a_kink_leaves_a_square_root_smooth(short: float, side: float) -> None:
     """Steps of a tenth, and one of `short` between them and a kink, where a square root begins: 2/3 x^(3/2)."""
-    edges = Edges(times=np.array([0.0, 1.6]), slopes=np.zeros((2, 0)), segment=np.zeros(1, dtype=int), first=0)
-    cuts = np.sort(np.append(KINK + side * (short + np.arange(8) / 10.0), KINK))
-    nodes = place(plan_of(panels_between(edges, cuts, cuts == KINK), edges), edges)
+    cuts, ends = one_interval(1.6), np.sort(np.append(KINK + side * (short + np.arange(8) / 10.0), KINK))
+    nodes = nodes_of(cut_at(whole_panels(cuts), cuts, ends, ends == KINK), cuts)
     distance = np.maximum(side * (nodes.t - KINK), 0.0)
     assert np.sum(nodes.weight) == pytest.approx(1.6, rel=1e-14, abs=0.0)
     assert nodes.weight @ np.sqrt(distance) == pytest.approx(2.0 / 3.0 * 0.8**1.5, rel=1e-7)
@@ -38,10 +43,10 @@ def test_a_short_step_at_a_kink_leaves_a_square_root_smooth(short: float, side: 
 )
 def test_kinks_between_the_nodes_of_a_panel_are_found(roots: tuple[float, ...]) -> None:
     """Where a polynomial passes zero: twice between two nodes, or beyond the outer ones."""
-    edges = Edges(times=np.array([0.0, 2.0]), slopes=np.zeros((2, 0)), segment=np.zeros(1, dtype=int), first=0)
-    panels = panels_between(edges, np.array([1.0]), np.array([False]))
+    cuts = one_interval(2.0)
+    panels = cut_at(whole_panels(cuts), cuts, np.array([1.0]), np.array([False]))
     signal = np.prod([panels.at(GAUSS)[0].ravel() * 2.0 - root for root in roots], axis=0)
-    t, panel, values = interpolated(panels, edges, signal.reshape(len(panels), len(GAUSS), 1))
+    t, panel, values = interpolated(panels, cuts, signal.reshape(len(panels), len(GAUSS), 1))
     assert crossings(t, panel, values[:, 0]) == pytest.approx(roots, abs=1e-12)
 
 

@@ -29,7 +29,7 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
 from ballpass.runtime.point.run_start import Initial, start_of
-from ballpass.runtime.quantity.passages import passing_times
+from ballpass.runtime.quantity.cuts import passing_times
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.questions import Questions
 from ballpass.runtime.report.digits import further, uncertainty

@@ -41,9 +41,9 @@ from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import DEFLECTION
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
-from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Estimate, Quantity

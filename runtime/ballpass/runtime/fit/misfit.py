@@ -22,10 +22,10 @@ from ballpass.runtime.fit.measured import Trial
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import quantities_of
-from ballpass.runtime.quantity.nodes import Nodes, make_edges
+from ballpass.runtime.quantity.nodes import fixed_nodes
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.quantity.track import ChannelValues, follow
+from ballpass.runtime.quantity.track import ChannelValues, Motion
 from ballpass.runtime.request.locating import kinks_with_derivatives
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
@@ -310,17 +310,10 @@ class Misfit:
         t = self._begin + trial.t + shift
         moving = np.zeros((len(t), len(names) + 1))
         moving[:, -1] = 1.0
-        nodes = Nodes(
-            t=t,
-            weight=np.zeros(len(t)),
-            segment=np.zeros(len(t), dtype=np.int_),
-            fraction=np.full(len(t), np.nan),
-            held=np.clip(np.searchsorted(segments.times, t, side="right") - 1, 0, len(segments.times) - 2),
-            slope=moving,
-            weight_slope=np.zeros_like(moving),
-        )
-        edges = make_edges(run, segments, None)
-        track = follow(run, segments, edges, nodes, chain, SENSITIVITY * self._rtol, still=not model.states)
+        held = np.clip(np.searchsorted(segments.times, t, side="right") - 1, 0, len(segments.times) - 2)
+        nodes = replace(fixed_nodes(t, held, held), slope=moving)
+        motion = Motion(run=run, segments=segments, still=not model.states)
+        track = motion.along(nodes, chain, SENSITIVITY * self._rtol)
         signals = ChannelValues(model, list(trial.signals)).along(track, numbers, chain)
         found: dict[str, Arrays] = {}
         for name, signal in signals.items():

@@ -22,8 +22,8 @@ from ballpass.runtime.many.distributions import NOISE, Distribution, stream
 from ballpass.runtime.many.spall_entries import driven_spalls, entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.quantity.cuts import entering_times
 from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
-from ballpass.runtime.quantity.passages import entering_times
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.request.request import Request

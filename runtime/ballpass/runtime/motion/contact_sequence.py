@@ -20,9 +20,8 @@ from ballpass.runtime.ask.kept_parts import Arrays
 from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.motion.shooting import Shooting
-from ballpass.runtime.quantity.kinks import DEFLECTION
-from ballpass.runtime.quantity.nodes import fixed_nodes, make_edges
-from ballpass.runtime.quantity.track import ChannelValues, follow
+from ballpass.runtime.native.reduction_rows import DEFLECTION
+from ballpass.runtime.quantity.track import ChannelValues, Motion
 from ballpass.runtime.request.ball_angles import ball_angles
 from ballpass.runtime.request.locating import kinks_with_derivatives
 from ballpass.runtime.request.request import Request
@@ -170,10 +169,8 @@ def _deflections(
     corners = np.unique([run.begin, *kept[:, 0].tolist(), run.end])
     between = corners[:-1, None] + np.diff(corners)[:, None] * np.arange(PARTS) / PARTS
     t = np.append(between.ravel(), run.end)
-    segments = segments_of(run)
-    held = np.clip(np.searchsorted(segments.times, t) - 1, 0, len(segments.inputs) - 1)
-    track = follow(run, segments, make_edges(run, segments, None), fixed_nodes(t, held, held), kept=kept)
-    seen = channels.along(track, numbers)
+    motion = Motion(run=run, segments=segments_of(run), kept=kept)
+    seen = channels.along(motion.along(motion.nodes_at(t)), numbers)
     return t, *(seen[name].value for name in channels.channels)
 
 

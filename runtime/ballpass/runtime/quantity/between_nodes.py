@@ -1,7 +1,7 @@
 """Extremes of channels along a run, found between its nodes.
 
-In: a track, channels along it, and the times of the extremes in the driver's reductions.  Out: an `Extreme` for each,
-of equal ones the first.
+In: nodes, channels along them, and the times of the extremes in the driver's reductions.  Out: a `Mark` for each, of
+equal ones the first.
 
 Around the best nodes, and around the moment of the reductions, the run is evaluated again on finer and finer grids,
 until a parabola through three points is exact to rounding.  Where two balls carry the same load, the largest ball force
@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import APART, Edges, Nodes, find, fixed_nodes
-from ballpass.runtime.quantity.track import Signal, Track
+from ballpass.runtime.quantity.nodes import APART, Cuts, Nodes, fixed_nodes
+from ballpass.runtime.quantity.records import Mark
+from ballpass.runtime.quantity.track import Signal
 
 Array = NDArray[np.float64]
 
@@ -53,30 +54,6 @@ class Wanted:
     exact: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extreme:
-    """Largest or smallest value of a channel.
-
-    Attributes
-    ----------
-    value : in the channel's unit
-    time : [s]
-    segment, fraction : its place
-    column : ball, counted from 0
-    other : ball that carries the same load there, else None
-    rate, other_rate : time derivatives of both where there is another [channel's unit / s]
-    """
-
-    value: float
-    time: float
-    segment: int
-    fraction: float
-    column: int
-    other: int | None = None
-    rate: float = 0.0
-    other_rate: float = 0.0
-
-
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Bracket:
     """An interval within one segment that holds an extreme, and its last grid."""
@@ -91,28 +68,28 @@ class _Bracket:
 
 def find_extremes(
     wanted: Sequence[Wanted],
-    track: Track,
+    cuts: Cuts,
+    nodes: Nodes,
     signals: Mapping[str, Signal],
     look: Callable[[Nodes], Mapping[str, Signal]],
     equal: float,
-) -> list[list[Extreme]]:
-    """Largest or smallest values over the nodes of a track and between them, and the next ones elsewhere.
+) -> list[list[Mark]]:
+    """Largest or smallest values over nodes of a run and between them, and the next ones elsewhere.
 
     Parameters
     ----------
-    signals : the channels along the track
+    signals : the channels along the nodes
     look : function that gives the channels of the same run along other nodes
     equal : extremes that differ by less are equal, relative to the largest size of the channel [1]
     """
-    edges = track.edges
-    brackets = [[] if item.exact else _brackets(item, track, signals[item.channel].value) for item in wanted]
+    brackets = [[] if item.exact else _brackets(item, cuts, nodes, signals[item.channel].value) for item in wanted]
     every = [bracket for some in brackets for bracket in some]
     for _ in range(ROUNDS if every else 0):
         for bracket in every:
             bracket.times = np.linspace(bracket.low, bracket.high, GRID)
         times = np.concatenate([bracket.times for bracket in every])
         segment = np.repeat([bracket.segment for bracket in every], GRID)
-        seen = look(fixed_nodes(times, segment, edges.segment[segment]))
+        seen = look(fixed_nodes(times, segment, cuts.segment[segment]))
         for k, bracket in enumerate(every):
             bracket.values = seen[bracket.wanted.channel].value[k * GRID : (k + 1) * GRID]
             best = _top(_height(bracket))
@@ -120,39 +97,39 @@ def find_extremes(
     return [
         _ranked(
             item,
-            [_extreme(bracket, edges) for bracket in some],
-            edges,
+            [_extreme(bracket, cuts) for bracket in some],
+            cuts,
             equal * float(np.max(np.abs(signals[item.channel].value))),
         )
         if some
-        else _seen(item, track, signals[item.channel].value)
+        else _seen(item, cuts, nodes, signals[item.channel].value)
         for item, some in zip(wanted, brackets, strict=True)
     ]
 
 
-def _seen(wanted: Wanted, track: Track, values: Array) -> list[Extreme]:
+def _seen(wanted: Wanted, cuts: Cuts, nodes: Nodes, values: Array) -> list[Mark]:
     """The moment of the reductions, and the best nodes elsewhere without refinement, as competing extremes."""
-    nodes, edges = track.nodes, track.edges
     assert wanted.seen is not None  # it is exact
     height = wanted.sign * np.max(values, axis=1)
-    found = [_at_node(nodes, values, int(k), wanted.sign) for k in _tops(nodes, height)[:CANDIDATES]]
+    found = [_at_node(nodes, values, int(k)) for k in _tops(nodes, height)[:CANDIDATES]]
     k = int(np.argmin(np.abs(nodes.t - wanted.seen)))
-    segment, fraction = find(edges, wanted.seen)
-    near = 1e-9 * edges.length / float(edges.times[segment + 1] - edges.times[segment])
+    place = cuts.find(np.array(wanted.seen))
+    segment, fraction = int(place[0]), float(place[1])
+    near = APART * cuts.length / float(cuts.times[segment + 1] - cuts.times[segment])
     fraction = 0.0 if fraction < near else 1.0 if 1.0 - fraction < near else fraction
-    best = replace(_at_node(nodes, values, k, wanted.sign), time=wanted.seen, segment=segment, fraction=fraction)
-    apart = 4.0 * edges.length / len(nodes)
+    best = replace(_at_node(nodes, values, k), time=wanted.seen, segment=segment, fraction=fraction)
+    apart = 4.0 * cuts.length / len(nodes)
     return [best, *(item for item in found if abs(item.time - best.time) > apart)]
 
 
-def _at_node(nodes: Nodes, values: Array, k: int, sign: float) -> Extreme:
-    column = int(np.argmax(sign * values[k])) if sign > 0.0 else int(np.argmax(values[k]))
-    return Extreme(
+def _at_node(nodes: Nodes, values: Array, k: int) -> Mark:
+    column = int(np.argmax(values[k]))
+    return Mark(
         value=float(values[k, column]),
         time=float(nodes.t[k]),
         segment=int(nodes.segment[k]),
         fraction=float(nodes.fraction[k]),
-        column=column,
+        ball=column,
     )
 
 
@@ -165,9 +142,8 @@ def _tops(nodes: Nodes, height: Array) -> NDArray[np.int_]:
     return tops[np.argsort(-height[tops], kind="stable")]
 
 
-def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
+def _brackets(wanted: Wanted, cuts: Cuts, nodes: Nodes, values: Array) -> list[_Bracket]:
     """Times around the best nodes that no neighbour in the same segment exceeds, and around that of the reductions."""
-    nodes, edges = track.nodes, track.edges
     height = wanted.sign * (values[:, wanted.ball] if wanted.ball is not None else np.max(values, axis=1))
     same, ranked = np.diff(nodes.segment) == 0, _tops(nodes, height)
     near = np.sort(ranked[np.max(height) - height[ranked] <= LOWER * np.ptp(height)])[:FIRST]
@@ -176,8 +152,8 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
         low, high = (k - 1 if k and same[k - 1] else k), (k + 1 if k < len(same) and same[k] else k)
         found.append((int(nodes.segment[k]), float(nodes.t[low]), float(nodes.t[high])))
     if wanted.seen is not None:
-        segment = int(np.clip(np.searchsorted(edges.times, wanted.seen, side="right") - 1, 0, len(edges.times) - 2))
-        left, right = float(edges.times[segment]), float(edges.times[segment + 1])
+        segment = int(cuts.find(np.array(wanted.seen))[0])
+        left, right = float(cuts.times[segment]), float(cuts.times[segment + 1])
         k = int(np.clip(np.searchsorted(nodes.t, wanted.seen), 1, len(nodes.t) - 1))
         reach = min(float(nodes.t[k] - nodes.t[k - 1]), wanted.seen - left, right - wanted.seen)
         # the moment itself is a point of the grid, or the end of the segment that it lies at
@@ -198,16 +174,16 @@ def _top(height: Array) -> int:
     return int(equal[len(equal) // 2])
 
 
-def _extreme(bracket: _Bracket, edges: Edges) -> Extreme:
+def _extreme(bracket: _Bracket, cuts: Cuts) -> Mark:
     """Extreme on the last grid of a bracket, by the parabola through its best point and both neighbours."""
     found, times, ball = bracket.values, bracket.times, bracket.wanted.ball
-    left, right = float(edges.times[bracket.segment]), float(edges.times[bracket.segment + 1])
+    left, right = float(cuts.times[bracket.segment]), float(cuts.times[bracket.segment + 1])
     k = _top(_height(bracket))
     column = ball if ball is not None else int(np.argmax(found[k]))
 
-    def at(time: float, value: float) -> Extreme:
+    def at(time: float, value: float) -> Mark:
         fraction = 0.0 if time <= left else 1.0 if time >= right else (time - left) / (right - left)
-        return Extreme(value=value, time=time, segment=bracket.segment, fraction=fraction, column=column)
+        return Mark(value=value, time=time, segment=bracket.segment, fraction=fraction, ball=column)
 
     result = at(float(times[k]), float(found[k, column]))
     if k in (0, GRID - 1):
@@ -226,8 +202,8 @@ def _extreme(bracket: _Bracket, edges: Edges) -> Extreme:
 
 
 def _crossing(
-    bracket: _Bracket, k: int, pair: tuple[int, int], at: Callable[[float, float], Extreme], result: Extreme
-) -> Extreme:
+    bracket: _Bracket, k: int, pair: tuple[int, int], at: Callable[[float, float], Mark], result: Mark
+) -> Mark:
     """Where the most loaded ball changes from one to another: lines through the neighbours, intersected."""
     found, times = bracket.values, bracket.times
     step = float(times[1] - times[0])
@@ -237,12 +213,12 @@ def _crossing(
     if abs(shift) > step:
         return result
     crossing = at(float(times[k]) + shift, float(found[k, a]) + rate_a * shift)
-    return replace(crossing, column=a, other=b, rate=rate_a, other_rate=rate_b)
+    return replace(crossing, ball=a, other=b, rate=rate_a, other_rate=rate_b)
 
 
-def _ranked(wanted: Wanted, found: list[Extreme], edges: Edges, equal: float) -> list[Extreme]:
+def _ranked(wanted: Wanted, found: list[Mark], cuts: Cuts, equal: float) -> list[Mark]:
     """The best of several, of equal ones the first, and the next ones elsewhere."""
     found.sort(key=lambda item: -wanted.sign * item.value)
     first = min((item for item in found if abs(item.value - found[0].value) <= equal), key=lambda item: item.time)
-    others = (item for item in found[: CANDIDATES + 1] if abs(item.time - first.time) > APART * edges.length)
+    others = (item for item in found[: CANDIDATES + 1] if abs(item.time - first.time) > APART * cuts.length)
     return [first, *others]

@@ -4,33 +4,31 @@ In: a run, the ends of its steps, quantities.  Out: `Layout` of all that share t
 
 A quantity's nodes depend only on itself and the run, so that its value is the same to the bit beside any others.
 Integrals have Gauss's nodes in every step, and finer ones where their channel needs it; extremes that the steps do not
-hold are searched between such nodes; a moment is a node of its own.
+hold are searched between such nodes; a moment is a node of its own.  `causes_of` says at which cuts panels end.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import EQUAL, reduction_rows
-from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
-from ballpass.runtime.quantity.kinks import DEFLECTION, crossings, rank_differences
-from ballpass.runtime.quantity.nodes import (
-    Edges,
-    NodePlan,
-    Nodes,
-    make_edges,
-    no_nodes,
-    part_of_nodes,
-    place,
-    with_passages,
+from ballpass.runtime.native.reduction_rows import DEFLECTION, EQUAL, reduction_rows
+from ballpass.runtime.quantity.between_nodes import Wanted, find_extremes
+from ballpass.runtime.quantity.cuts import (
+    Angles,
+    crossings,
+    find_passages,
+    jumps_at,
+    rank_differences,
+    window_angles,
 )
+from ballpass.runtime.quantity.location import place_of, place_slope
+from ballpass.runtime.quantity.nodes import Cause, Cuts, Nodes, fixed_nodes, part_of_nodes, scheduled_cuts
 from ballpass.runtime.quantity.panels import (
     GAUSS,
     Panels,
@@ -38,21 +36,21 @@ from ballpass.runtime.quantity.panels import (
     cut_at,
     inner_nodes,
     interpolated,
+    nodes_of,
     panels_of_steps,
     parts_needed,
     parts_of_oscillation,
-    plan_of,
     same_panels,
     split,
-    uniform_panels,
+    whole_panels,
 )
-from ballpass.runtime.quantity.passages import EdgeDistances, JumpDistance, Passages, find_passages, jumps_at
-from ballpass.runtime.quantity.records import Kind, Quantity, View
+from ballpass.runtime.quantity.records import Kind, Mark, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
+from ballpass.runtime.quantity.track import ChannelValues, Motion, Signal, Track, depends
 from ballpass.runtime.request.locating import LOCATED, stepper_for
 from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.loop import segments_of
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
@@ -85,44 +83,23 @@ class Layout:
     Attributes
     ----------
     items : the quantities
-    still : whether they follow from time alone, so that no state has to be known
-    kept : steps of the run
-    segments : of the driver
-    edges, panels, plan : where nodes lie; no panels where moments alone are asked for
-    passages : edges that the motion moves, those of windows and of jumps of an angle
-    track, signals : states and channels along them
-    extremes : by quantity and "max" or "min", the best first
+    motion : the run
+    causes : of cuts at which their panels end; none of moments, which have no panels
+    cuts, panels : where nodes lie
+    near : extremes as near as this to a cut where a window's edge is passed are at it [s]
+    track, signals : states and channels along the nodes
+    marks : moments; extremes by quantity and "max" or "min", the best first
     """
 
     items: tuple[Quantity, ...]
-    still: bool
-    kept: Array
-    segments: Segments
-    edges: Edges
-    passages: tuple[Passages, ...]
-    panels: Panels | None
-    plan: NodePlan
-    track: Track | None
+    motion: Motion
+    causes: frozenset[Cause]
+    cuts: Cuts
+    panels: Panels
+    near: float
+    track: Track
     signals: Mapping[str, Signal]
-    extremes: Mapping[tuple[str, str], list[Extreme]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Sort:
-    """Properties that decide about the first nodes of a quantity.
-
-    Attributes
-    ----------
-    moment : whether a moment is its only node
-    still : whether it follows from time alone
-    graded : whether panels get finer towards kinks; states are smooth where contacts begin
-    wrapped : channel that is integrated and jumps by a turn; "" for another
-    """
-
-    moment: bool
-    still: bool
-    graded: bool
-    wrapped: str
+    marks: Mapping[tuple[str, str], list[Mark]]
 
 
 class NodeLayer:
@@ -144,11 +121,28 @@ class NodeLayer:
         # among the quantities of every bearing, whether or not the scene's outputs name them
         names = [bearing.prefix + DEFLECTION for bearing in model.manifest.bearings]
         self._deflections = ChannelValues(model, [*names, *model.manifest.stops])
+        self._windows = window_angles(model)
 
     def is_still(self, quantity: Quantity) -> bool:
         """Whether a quantity follows from time alone."""
         names = channels_of([quantity])
         return all(name not in self.model.states and not depends(self.model, name, "x") for name in names)
+
+    def causes_of(self, quantity: Quantity) -> frozenset[Cause]:
+        """Causes of cuts at which panels of a quantity end."""
+        kind, output = kind_of(quantity), quantity.channel not in self.model.states
+        if kind.at_moment:
+            return frozenset()
+        wanted = {
+            Cause.SCHEDULE: True,
+            # an extreme where a load begins moves with it, so that extremes need these cuts as well
+            Cause.WINDOW: bool(self.model.manifest.edges) and not self.is_still(quantity),
+            Cause.JUMP: output and kind.integrates and jumps_at(quantity.channel) is not None,
+            # panels get finer towards kinks; states are smooth where contacts begin
+            Cause.KINK: output and not self._is_found(quantity),
+            Cause.RANK: output and kind.integrates and not kind.steep and _is_of_balls(quantity) and not quantity.ball,
+        }
+        return frozenset(cause for cause, whether in wanted.items() if whether)
 
     def lay(self, run: Run, kept: Array, row: Array, noded: Sequence[Quantity]) -> list[Layout]:
         """Nodes of all quantities, and the run along them.
@@ -159,89 +153,93 @@ class NodeLayer:
         row : reductions of the run
         """
         segments = segments_of(run)
-        first = Layout(
-            items=(),
-            still=False,
-            kept=kept,
-            segments=segments,
-            edges=make_edges(run, segments, None),
-            passages=(),
-            panels=None,
-            plan=no_nodes(),
-            track=None,
-            signals={},
-            extremes={},
-        )
-        sorts: dict[_Sort, list[Quantity]] = defaultdict(list)
+        groups: dict[tuple[bool, frozenset[Cause], str], list[Quantity]] = defaultdict(list)
         for item in noded:
-            moment, resolved = kind_of(item).at_moment, not self._is_found(item)
-            graded = resolved and item.channel not in self.model.states
-            wrapped = item.channel if jumps_at(item.channel) is not None and self._is_kinked(item) else ""
-            sort = _Sort(moment=moment, still=self.is_still(item), graded=graded and not moment, wrapped=wrapped)
-            sorts[sort].append(item)
+            causes = self.causes_of(item) - {Cause.RANK}  # searched for each quantity, in panels that it shares
+            groups[self.is_still(item), causes, item.channel if Cause.JUMP in causes else ""].append(item)
         found: list[Layout] = []
-        for sort, items in sorts.items():
-            here = replace(first, items=tuple(items), still=sort.still)
-            if sort.moment:
-                found.append(here)
-                continue
-            kinks = (kept[:, 1] > 0.0) & sort.graded
-            here = self._along(run, here, self._panels(run, here, kinks))
-            if sort.wrapped:
-                angle = JumpDistance(self._channels.only(channels_of(items)))
-                here = self._with_passages(run, here, kinks, angle)
-            if not sort.still and self.model.manifest.edges:
-                # an extreme where a load begins moves with it, so that extremes need passages as well
-                here = self._with_passages(run, here, kinks, EdgeDistances(self.model))
-            found += self._refined(run, here, kinks)
-        return [self._with_extremes(run, one, row) for one in found]
+        for (still, causes, _), items in groups.items():
+            motion = Motion(run=run, segments=segments, kept=kept, still=still)
+            here = self._first(motion, causes, tuple(items), scheduled_cuts(run, segments))
+            for cause, angles in self.angles_of(here).items():
+                passed = find_passages(motion, here.cuts, here.track, angles)
+                if len(passed.times):
+                    cuts = here.cuts.more(passed.times - passed.before, cause, passed.angle)
+                    here = replace(self._first(motion, causes, here.items, cuts), near=10.0 * passed.before)
+            # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
+            for one in self._finer(here, self._refined, PASSES if still else 1) if causes else [here]:
+                found += self._finer(one, self._ranked, RANKED)
+        return [self._with_extremes(one, row) for one in found]
 
-    def _panels(self, run: Run, layout: Layout, kinks: NDArray[np.bool_]) -> Panels:
-        mechanism, manifest = self.model.manifest.mechanism, self.model.manifest
+    def angles_of(self, layout: Layout) -> dict[Cause, Angles]:
+        """Angles that pass at cuts of a cause."""
+        found = {}
+        zero = jumps_at(layout.items[0].channel)
+        if Cause.JUMP in layout.causes and zero is not None:
+            channel = self._channels.only(channels_of(layout.items))
+            found[Cause.JUMP] = Angles(channel=channel, zero=zero, which=[0], before=0.0)
+        if Cause.WINDOW in layout.causes:
+            found[Cause.WINDOW] = self._windows
+        return found
+
+    def _first(self, motion: Motion, causes: frozenset[Cause], items: tuple[Quantity, ...], cuts: Cuts) -> Layout:
+        """Moments; else panels that are steps, and the run along their nodes."""
+        panels = self._panels(motion, cuts, causes) if causes else whole_panels(cuts)
+        nodes, marks = (nodes_of(panels, cuts), {}) if causes else moments(motion.run, cuts, items)
+        track = motion.along(nodes)
+        return Layout(
+            items=items,
+            motion=motion,
+            causes=causes,
+            cuts=cuts,
+            panels=panels,
+            near=0.0,
+            track=track,
+            signals=self._channels.only(channels_of(items)).along(track, motion.run.numbers),
+            marks={key: [mark] for key, mark in marks.items()},
+        )
+
+    def _panels(self, motion: Motion, cuts: Cuts, causes: frozenset[Cause]) -> Panels:
+        """Panels that are steps; of what follows from time alone even ones."""
+        mechanism, manifest, run = self.model.manifest.mechanism, self.model.manifest, motion.run
         angle = "" if mechanism is None else mechanism.angle
 
         def turned(times: Array) -> Array:
             if not angle:
                 return np.asarray(timeline.driver(manifest, run.numbers.values).at(times)[0] / TURN)
             distinct, back = np.unique(times, return_inverse=True)
-            states = stepper_for(self.model, run.kinks).read(layout.kept, distinct)
+            states = stepper_for(self.model, run.kinks).read(motion.kept, distinct)
             found = states[:, self.model.states.index(angle)][back].reshape(times.shape)
             return np.asarray(found / TURN)
 
         # what follows from time alone does not see where a torque has brought the driver
-        asked = None if timeline.is_even(manifest, run.numbers.values) or (angle and layout.still) else turned
-        if layout.still:
-            return uniform_panels(layout.edges, run.stretch, asked)
-        return panels_of_steps(layout.edges, layout.kept[:, 0], kinks, run.stretch, asked)
+        asked = None if timeline.is_even(manifest, run.numbers.values) or (angle and motion.still) else turned
+        steps = motion.kept[: 0 if motion.still else None]
+        kinks = (steps[:, 1] > 0.0) & (Cause.KINK in causes)
+        return panels_of_steps(cuts, steps[:, 0], kinks, run.stretch, asked)
 
-    def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
+    def _along(self, layout: Layout, panels: Panels) -> Layout:
         """The run along the nodes of panels; what the layout knows in panels that it has is taken from there."""
-        plan, channels = plan_of(panels, layout.edges), self._channels.only(channels_of(layout.items))
-        nodes, known = place(plan, layout.edges), layout.track
-        if known is None or layout.panels is None:
-            track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
-            signals = channels.along(track, run.numbers)
-            return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
+        motion, nodes = layout.motion, nodes_of(panels, layout.cuts)
+        channels, numbers = self._channels.only(channels_of(layout.items)), motion.run.numbers
         here, there = (
             inner_nodes(one)[same].ravel()
             for one, same in zip((panels, layout.panels), same_panels(panels, layout.panels), strict=True)
         )
-        fresh = np.delete(np.arange(len(nodes)), here)
+        new = np.delete(np.arange(len(nodes)), here)
 
-        def joined(new: Array, old: Array) -> Array:
-            every = np.empty((len(nodes), *new.shape[1:]))
-            every[fresh], every[here] = new, old[there]
+        def joined(added: Array, known: Array) -> Array:
+            every = np.empty((len(nodes), *added.shape[1:]))
+            every[new], every[here] = added, known[there]
             return every
 
-        part = follow(
-            *(run, layout.segments, layout.edges, part_of_nodes(nodes, fresh)), kept=layout.kept, still=layout.still
-        )
+        part, known = motion.along(part_of_nodes(nodes, new)), layout.track
         signals = {
             name: Signal(
                 value=joined(signal.value, layout.signals[name].value),
                 slope=joined(signal.slope, layout.signals[name].slope),
             )
-            for name, signal in channels.along(part, run.numbers).items()
+            for name, signal in channels.along(part, numbers).items()
         }
         track = replace(
             part,
@@ -251,75 +249,47 @@ class NodeLayer:
             local=joined(part.local, known.local),
             u=joined(part.u, known.u),
         )
-        return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
+        return replace(layout, panels=panels, track=track, signals=signals)
 
-    def _with_passages(
-        self, run: Run, layout: Layout, kinks: NDArray[np.bool_], angles: EdgeDistances | JumpDistance
-    ) -> Layout:
-        """The same with edges where angles pass zero."""
-        assert layout.track is not None
-        passed = find_passages(run, layout.track, angles, layout.kept, still=layout.still)
-        if not len(passed.times):
-            return layout
-        edges = with_passages(layout.edges, passed.times, np.zeros((len(passed.times), 0)))
-        layout = replace(layout, edges=edges, passages=(*layout.passages, passed), panels=None)
-        return self._along(run, layout, self._panels(run, layout, kinks))
-
-    def _refined(self, run: Run, layout: Layout, kinks: NDArray[np.bool_], passes: int = PASSES) -> list[Layout]:
-        """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
-        assert layout.track is not None
-        assert layout.panels is not None
-        each = []
+    def _finer(self, layout: Layout, panels_of: Callable[[Layout, Quantity], Panels], passes: int) -> list[Layout]:
+        """Panels made finer for each quantity, at most so many times: those that need the same ones share them."""
+        shared: dict[bytes, tuple[Panels, list[Quantity]]] = {}
         for item in layout.items:
-            panels = layout.panels
-            if not self._is_found(item):
-                panels = split(panels, self._parts(run, layout, item))
-                panels = cut_at(panels, layout.edges, self._kinks(run, layout, item))
-            each.append((item, panels))
+            panels = panels_of(layout, item)
+            shared.setdefault(panels.low.tobytes() + panels.begin.tobytes(), (panels, []))[1].append(item)
         found = []
-        for here in self._each_along(run, layout, each):
-            # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
-            again = layout.still and passes > 1 and here.panels is not layout.panels
-            found += self._refined(run, here, kinks, passes - 1) if again else self._ranked(run, here)
+        for panels, items in shared.values():
+            here = replace(layout, items=tuple(items))
+            if panels is not layout.panels:
+                here = self._along(here, panels)
+                found += self._finer(here, panels_of, passes - 1) if passes > 1 else [here]
+            else:
+                found.append(here)
         return found
 
-    def _each_along(self, run: Run, layout: Layout, each: Sequence[tuple[Quantity, Panels]]) -> list[Layout]:
-        """The run along the nodes of each quantity: those that need the same ones share them."""
-        shared: dict[bytes, tuple[Panels, list[Quantity]]] = {}
-        for item, panels in each:
-            shared.setdefault(panels.low.tobytes() + panels.begin.tobytes(), (panels, []))[1].append(item)
-        groups = [(panels, replace(layout, items=tuple(items))) for panels, items in shared.values()]
-        return [here if panels is layout.panels else self._along(run, here, panels) for panels, here in groups]
+    def _refined(self, layout: Layout, item: Quantity) -> Panels:
+        """Panels as fine as a quantity needs, which end at its kinks."""
+        if self._is_found(item):
+            return layout.panels
+        return cut_at(split(layout.panels, self._parts(layout, item)), layout.cuts, self._kinks(layout, item))
 
-    def _ranked(self, run: Run, layout: Layout, passes: int = RANKED) -> list[Layout]:
+    def _ranked(self, layout: Layout, item: Quantity) -> Panels:
         """Panels that end where another ball becomes the most loaded one, for quantities of that ball.
 
         The balls' forces are smooth within the panels, so that two changes between two nodes are found as well.
         """
-        assert layout.panels is not None
-        each = []
-        for item in layout.items:
-            times = np.zeros(0)
-            if self._is_kinked(item) and _is_of_balls(item) and item.ball is None and not kind_of(item).steep:
-                forces = _at_nodes(layout, layout.signals[item.channel].value)
-                low, high = bounds(forces)
-                close = np.count_nonzero(high >= np.max(low, axis=1, keepdims=True), axis=1) > 1
-                t, segment, table = _between_nodes(layout, forces, close)
-                signals, counts = rank_differences(segment, table)
-                times = crossings(t, segment, *signals.T, counts=counts.T)
-            each.append((item, cut_at(layout.panels, layout.edges, times)))
-        found = []
-        for here in self._each_along(run, layout, each):
-            again = passes > 1 and here.panels is not layout.panels
-            found += self._ranked(run, here, passes - 1) if again else [here]
-        return found
+        if Cause.RANK not in self.causes_of(item):
+            return layout.panels
+        forces = layout.signals[item.channel].value[inner_nodes(layout.panels)]
+        low, high = bounds(forces)
+        close = np.count_nonzero(high >= np.max(low, axis=1, keepdims=True), axis=1) > 1
+        t, segment, table = _between_nodes(layout, forces, close)
+        signals, counts = rank_differences(segment, table)
+        return cut_at(layout.panels, layout.cuts, crossings(t, segment, *signals.T, counts=counts.T))
 
-    def _parts(self, run: Run, layout: Layout, item: Quantity) -> NDArray[np.int_]:
+    def _parts(self, layout: Layout, item: Quantity) -> NDArray[np.int_]:
         """Into how many parts each panel is to be split; none where there would be too many."""
-        assert layout.track is not None
-        assert layout.panels is not None
-        within = np.flatnonzero(layout.track.nodes.weight)
-        signal = layout.signals[item.channel].value[within]
+        signal = layout.signals[item.channel].value[inner_nodes(layout.panels).ravel()]
         # integrands of loads are steeper than the loads
         each = [signal, *([np.maximum(signal, 0.0) ** 3] if kind_of(item).steep else [])]
         # places of a raceway are hat functions of the balls' angles, whose corners no panel ends at
@@ -330,28 +300,21 @@ class NodeLayer:
         oscillation = kind_of(item).frequency
         if oscillation is None:
             return parts
-        view = View(
-            run=run,
-            nodes=layout.track.nodes,
-            signals=layout.signals,
-            marks={},
-            slopes=lambda _: np.zeros(0),
-            names=(),
-        )
-        faster = parts_of_oscillation(layout.panels, layout.edges, oscillation(view, item)[0])
+        view = View(run=layout.motion.run, nodes=layout.track.nodes, signals=layout.signals)
+        faster = parts_of_oscillation(layout.panels, layout.cuts, oscillation(view, item)[0])
         nodes, columns = len(GAUSS) * int(np.sum(faster)), len(self.model.states) + signal.shape[1]
         check_memory(f"{item.name}: {nodes} nodes of", nodes, columns, "Ask for a lower frequency.")
         return np.maximum(parts, faster)
 
-    def _kinks(self, run: Run, layout: Layout, item: Quantity) -> Array:
+    def _kinks(self, layout: Layout, item: Quantity) -> Array:
         """Times of kinks of an integrated channel, beside those on which steps end [s]."""
+        run = layout.motion.run
         # a corner of the damping at rest is in the force of each ball, and not in the motion
         corner = _is_of_balls(item) and any(bearing.damping.corner_at_rest for bearing in self.model.manifest.bearings)
         # a step as long as a turn meets a stop and leaves it, and shows neither
         known = run.kinks == LOCATED and not corner and not self.model.manifest.stops
-        if not self._is_kinked(item) or not self._deflections.channels or known:
+        if known or not kind_of(item).integrates or Cause.KINK not in layout.causes or not self._deflections.channels:
             return np.zeros(0)
-        assert layout.track is not None
         values, rates = self._deflections.with_rates(layout.track, run.numbers)
         # where a body leaves a stop faster than the stop expands, its force stays at zero
         stops, numbers = {stop: _hysteresis(stop) for stop in self.model.manifest.stops}, run.numbers.parameters
@@ -363,7 +326,7 @@ class NodeLayer:
             forces = layout.signals[item.channel].value
             first = self._deflections.column(item.channel.partition("ball.")[0] + DEFLECTION)
             every.append(rates[:, first : first + forces.shape[1]])
-        signals = _at_nodes(layout, np.hstack([*every, forces]))
+        signals = np.hstack([*every, forces])[inner_nodes(layout.panels)]
         count = signals.shape[2] - forces.shape[1]
         low, high = bounds(signals[:, :, :count])
         t, segment, signals = _between_nodes(layout, signals, np.any((low < 0.0) & (high > 0.0), axis=1))
@@ -371,16 +334,12 @@ class NodeLayer:
         counts[:, count - forces.shape[1] :] = _taking_part(item, signals[:, count:])
         return crossings(t, segment, *signals[:, :count].T, counts=counts.T)
 
-    def _is_kinked(self, item: Quantity) -> bool:
-        """Whether a quantity integrates an output."""
-        return kind_of(item).integrates and item.channel not in self.model.states
-
-    def _with_extremes(self, run: Run, layout: Layout, row: Array) -> Layout:
+    def _with_extremes(self, layout: Layout, row: Array) -> Layout:
         """The same with the extremes of its quantities, and the next ones."""
         asked = [(item, kind) for item in layout.items for kind in kind_of(item).extremes]
-        track = layout.track
-        if not asked or track is None:
+        if not asked:
             return layout
+        run, channels = layout.motion.run, self._channels.only(channels_of(layout.items))
         rows = reduction_rows(self.model.manifest)
 
         def wanted(item: Quantity, kind: str) -> Wanted:
@@ -390,17 +349,15 @@ class NodeLayer:
             return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))
 
         def look(nodes: Nodes) -> Mapping[str, Signal]:
-            seen = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
-            return self._channels.only(channels_of(layout.items)).along(seen, run.numbers)
+            return channels.along(layout.motion.along(nodes), run.numbers)
 
         each = [wanted(item, kind) for item, kind in asked]
         distinct = list(dict.fromkeys(each))
-        equal = max(run.rtol, EQUAL)
-        found = dict(zip(distinct, find_extremes(distinct, track, layout.signals, look, equal), strict=True))
-        extremes = {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
-        if layout.passages:
-            extremes = {key: [_beside(one, layout) for one in some] for key, some in extremes.items()}
-        return replace(layout, extremes=extremes)
+        nodes, equal = layout.track.nodes, max(run.rtol, EQUAL)
+        extremes = find_extremes(distinct, layout.cuts, nodes, layout.signals, look, equal)
+        found = {one: [_beside(mark, layout) for mark in some] for one, some in zip(distinct, extremes, strict=True)}
+        marks = {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
+        return replace(layout, marks=marks)
 
     def _is_found(self, quantity: Quantity) -> bool:
         """Whether its moments are known before nodes are laid: places, and extremes that the steps hold.
@@ -430,17 +387,10 @@ def channels_of(quantities: Iterable[Quantity]) -> list[str]:
     return list(names)
 
 
-def _at_nodes(layout: Layout, signals: Array) -> Array:
-    """Signals at the nodes of panels, shape (panels, 4, columns), of those along a track."""
-    assert layout.panels is not None
-    return signals[inner_nodes(layout.panels)]
-
-
 def _between_nodes(layout: Layout, signals: Array, which: NDArray[np.bool_]) -> tuple[Array, NDArray[np.int_], Array]:
     """Times, intervals and signals at places between the nodes of some of the panels too."""
-    assert layout.panels is not None
     rows = np.flatnonzero(which)
-    return interpolated(layout.panels.some(rows), layout.edges, signals[rows])
+    return interpolated(layout.panels.some(rows), layout.cuts, signals[rows])
 
 
 def _taking_part(item: Quantity, forces: Array) -> NDArray[np.bool_]:
@@ -484,18 +434,16 @@ def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
     return set(needs(quantity) or (quantity.channel,)) <= set(known.channels if needs(quantity) else known.states)
 
 
-def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
+def around(layout: Layout, extreme: Mark) -> tuple[tuple[int, float], ...]:
     """Points before and after an extreme, within its panel; none where that ends beside it."""
     panels = layout.panels
-    if panels is None:
-        return ()
     ends = panels.at(np.array([0.0, 1.0]))[0]
     inside = (panels.segment == extreme.segment) & (ends[:, 0] <= extreme.fraction) & (extreme.fraction <= ends[:, 1])
     if not np.any(inside) or extreme.other is not None:
         return ()
     low, high = ends[int(np.flatnonzero(inside)[0])].tolist()
     length = high - low
-    if layout.still:  # panels of what follows from time alone end at no kink
+    if layout.motion.still:  # panels of what follows from time alone end at no kink
         low, high = 0.0, 1.0
     distance = min(AROUND * length, min(extreme.fraction - low, high - extreme.fraction) / (BESIDE + 0.1))
     if distance < NEAREST * length:
@@ -503,11 +451,30 @@ def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
     return tuple((extreme.segment, extreme.fraction + j * distance) for j in range(-BESIDE, BESIDE + 1) if j)
 
 
-def _beside(extreme: Extreme, layout: Layout) -> Extreme:
+def _beside(extreme: Mark, layout: Layout) -> Mark:
     """An extreme where a load begins or ends is at a corner of the channel, and moves with it."""
-    for passages in layout.passages:
-        beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
-        if len(beside):
-            edge = int(np.searchsorted(layout.edges.times, passages.times[beside[0]]))
-            return replace(extreme, segment=edge - 1, fraction=1.0)
-    return extreme
+    passed = layout.cuts.cause == Cause.WINDOW
+    beside = np.flatnonzero(passed & (np.abs(layout.cuts.times - extreme.time) < layout.near))
+    return replace(extreme, segment=int(beside[0]) - 1, fraction=1.0) if len(beside) else extreme
+
+
+def moments(
+    run: Run, cuts: Cuts, items: Sequence[Quantity], chain: Chain | None = None
+) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
+    """A node for each quantity that is taken at one moment, and its mark.
+
+    At a cut the loads behind it hold, at the end those before.
+    """
+    places = [place_of(run.model.manifest, run.numbers, run.end, item) for item in items]
+    marks = {
+        (item.name, "place"): Mark(node=k, time=time)
+        for k, (item, (time, _)) in enumerate(zip(items, places, strict=True))
+    }
+    times = np.array([cuts.times[-1] if place.kind == "end" else time for time, place in places])
+    segment = cuts.find(times)[0]
+    nodes = fixed_nodes(times, segment, cuts.segment[segment], cuts.slopes.shape[1])
+    if chain is not None:
+        given = (run.model.manifest, run.numbers)
+        slopes = [place_slope(*given, place, time, cuts.slopes[-1], chain.derivative) for time, place in places]
+        nodes = replace(nodes, slope=np.array(slopes))
+    return nodes, marks

@@ -1,25 +1,23 @@
-"""Nodes at which a run is evaluated: at fixed fractions of its segments, which move with the parameters.
+"""Cuts of a run, and the nodes between them at which it is evaluated.
 
-In: a run.  Out: `Edges` with their derivatives, a `NodePlan`, and `Nodes`, the plan put onto the edges.
+In: a run.  Out: `Cuts`, and `Nodes` at fixed fractions of the intervals between cuts, which move with the parameters.
 
-A load switches at an edge, and outputs may jump there; speed and windows move the edges.  Nodes that keep their
-fraction of a segment never cross one, so that sums over nodes are smooth functions of the parameters:
-integrals by Gauss's rule on panels within the segments (`panels.py`), values at both sides of each edge for extremes.
+A load switches at a cut, and outputs may jump there; speed and windows move the cuts.  Nodes that keep their
+fraction of an interval never cross one, so that sums over nodes are smooth functions of the parameters:
+integrals by Gauss's rule on panels within the intervals (`panels.py`), values at both sides of each cut for extremes.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.request.resolve import Run
-from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.time import timeline
 
 Array = NDArray[np.float64]
 
@@ -27,19 +25,36 @@ Array = NDArray[np.float64]
 APART = 1e-9
 
 
+class Cause(IntEnum):
+    """Why panels of a quantity end at a time.
+
+    Nodes are on both sides of the first three, and move with them; a channel is continuous across the others.
+    """
+
+    SCHEDULE = 0  # known before the run: row of a table, edge of a window, whole turn, begin and end of what counts
+    WINDOW = 1  # the motion passes the edge of a window, or a ball that of a spall
+    JUMP = 2  # an angle comes back by a turn
+    KINK = 3  # a contact or stop begins or ends, or a law has a corner
+    RANK = 4  # another ball becomes the most loaded one
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Edges:
-    """Ends of the intervals of a run within which nodes keep their place.
+class Cuts:
+    """Cuts of a run that move with the parameters, in order.
 
     Attributes
     ----------
-    times : ends of the driver's segments, and passages of windows' edges between them; shape (edges,) [s]
-    slopes : their derivatives along the directions, shape (edges, directions) [s/unit]
-    segment : of the driver, of each interval, shape (edges - 1,)
-    first : index of the edge at which the time that counts begins
+    times : shape (cuts,) [s]
+    cause : a `Cause` each, shape (cuts,)
+    angle : which of the angles of its cause passes there, shape (cuts,)
+    slopes : derivatives of `times` along the directions, shape (cuts, directions) [s/unit]
+    segment : of the driver, of each interval between two, shape (cuts - 1,)
+    first : index of the cut at which the time that counts begins
     """
 
     times: Array
+    cause: NDArray[np.int_]
+    angle: NDArray[np.int_]
     slopes: Array
     segment: NDArray[np.int_]
     first: int
@@ -49,24 +64,42 @@ class Edges:
         """Of the run [s]."""
         return float(self.times[-1] - self.times[0])
 
+    def find(self, times: Array) -> tuple[NDArray[np.int_], Array]:
+        """Intervals of times, and fractions of them; a cut belongs to the interval after it."""
+        k = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        left, right = self.times[k], self.times[k + 1]
+        return k, np.clip((times - left) / (right - left), 0.0, 1.0)
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NodePlan:
-    """Nodes as fractions of segments: a plan made for one set of parameters holds for its neighbours.
+    def more(self, times: Array, cause: Cause, angle: NDArray[np.int_]) -> Cuts:
+        """The same with further ones of one cause, whose derivatives are not known."""
+        order = np.argsort(np.concatenate([self.times, times]), kind="stable")
+        inside = self.segment[np.searchsorted(self.times, times) - 1]
+        more = {"times": times, "cause": np.full(len(times), cause), "angle": angle}
+        joined = {name: np.concatenate([getattr(self, name), added])[order] for name, added in more.items()}
+        return Cuts(
+            **joined,
+            slopes=np.zeros((len(order), 0)),
+            segment=np.concatenate([self.segment, [-1], inside])[order][:-1],
+            first=int(np.flatnonzero(order == self.first)[0]),
+        )
 
-    Attributes
+
+def scheduled_cuts(run: Run, segments: Segments) -> Cuts:
+    """Cuts of a run that are known before it.
+
+    Parameters
     ----------
-    segment : interval of each node, shape (nodes,)
-    fraction : place within it, 0 and 1 being its sides of the edges, shape (nodes,)
-    weight : share of the interval's length that counts in integrals, shape (nodes,)
+    segments : all of the run
     """
-
-    segment: NDArray[np.int_]
-    fraction: Array
-    weight: Array
-
-    def __len__(self) -> int:
-        return len(self.segment)
+    count = len(segments.times)
+    return Cuts(
+        times=segments.times,
+        cause=np.full(count, Cause.SCHEDULE),
+        angle=np.zeros(count, dtype=np.int_),
+        slopes=np.zeros((count, 0)),
+        segment=np.arange(count - 1),
+        first=int(np.argmin(np.abs(segments.times - run.start))),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +110,7 @@ class Nodes:
     ----------
     t : shape (nodes,) [s]
     weight : weights of integrals over time, shape (nodes,) [s]
-    segment, fraction : interval between edges, and place within it, shape (nodes,)
+    segment, fraction : interval between cuts, and place within it, shape (nodes,)
     held : segment of the driver whose inputs hold, shape (nodes,)
     slope, weight_slope : derivatives of both along the directions, shape (nodes, directions)
     """
@@ -94,89 +127,40 @@ class Nodes:
         return len(self.t)
 
 
-def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
-    """Edges of a run and their derivatives along the directions of a chain.
+def place(cuts: Cuts, segment: NDArray[np.int_], fraction: Array, share: Array) -> Nodes:
+    """Nodes between cuts, which move with these.
 
     Parameters
     ----------
-    segments : all of the run
-
-    Raises
-    ------
-    RequestError
-        Several loads switch at one time, and a parameter moves one of them away from another.
+    segment, fraction : interval and place within it, 0 and 1 being its sides of the cuts, shape (nodes,)
+    share : of the interval's length, which counts in integrals, shape (nodes,)
     """
-    times, near = segments.times, APART * min(run.stretch, run.duration)
-    first = int(np.argmin(np.abs(times - run.start)))
-    columns = np.zeros((len(times), 0 if chain is None else len(chain.names)))
-    if chain is not None:
-        even = timeline.is_even(run.model.manifest, run.numbers.values) and math.isfinite(run.stretch)
-        for k, time in enumerate(times[1:-1].tolist(), start=1):
-            moved, counts = chain.breakpoint(time), abs(time - run.start) <= near
-            if moved is not None and not counts:
-                columns[k] = moved
-            elif counts or even:
-                columns[k] = chain.after(time)
-        if run.span.asked is not None:
-            columns[-1] = chain.after(run.end, run.begin)
-    return Edges(times=times, slopes=columns, segment=np.arange(len(times) - 1), first=first)
-
-
-def with_passages(edges: Edges, times: Array, slopes: Array) -> Edges:
-    """Edges with further ones that move, in order.
-
-    Parameters
-    ----------
-    slopes : derivatives of `times` along the directions, shape (times, directions) [s/unit]
-    """
-    every = np.concatenate([edges.times, times])
-    inside = edges.segment[np.searchsorted(edges.times, times) - 1]
-    order = np.argsort(every, kind="stable")
-    segment = np.concatenate([edges.segment, [-1], inside])[order][:-1]
-    return Edges(
-        times=every[order],
-        slopes=np.concatenate([edges.slopes, slopes])[order],
-        segment=segment,
-        first=int(np.flatnonzero(order == edges.first)[0]),
-    )
-
-
-def no_nodes() -> NodePlan:
-    """A plan without nodes."""
-    return NodePlan(segment=np.zeros(0, dtype=np.int_), fraction=np.zeros(0), weight=np.zeros(0))
-
-
-def with_points(plan: NodePlan, points: Sequence[tuple[int, float]]) -> NodePlan:
-    """A plan with further nodes (segment, fraction) that carry no weight, in order of time."""
-    if not points:
-        return plan
-    segment = np.concatenate([plan.segment, [point[0] for point in points]]).astype(np.int_)
-    fraction = np.concatenate([plan.fraction, [point[1] for point in points]])
-    weight = np.concatenate([plan.weight, np.zeros(len(points))])
-    return ordered_plan(segment, fraction, weight)
-
-
-def ordered_plan(segment: NDArray[np.int_], fraction: Array, weight: Array) -> NodePlan:
-    """A plan with these nodes in order of time."""
-    order = np.lexsort((fraction, segment))
-    return NodePlan(segment=segment[order], fraction=fraction[order], weight=weight[order])
-
-
-def place(plan: NodePlan, edges: Edges) -> Nodes:
-    """A plan put onto edges."""
-    left, right = edges.times[plan.segment], edges.times[plan.segment + 1]
-    left_slope, right_slope = edges.slopes[plan.segment], edges.slopes[plan.segment + 1]
-    inner = plan.fraction[:, None]
-    t = np.where(plan.fraction == 1.0, right, left + plan.fraction * (right - left))
+    left, right = cuts.times[segment], cuts.times[segment + 1]
+    left_slope, right_slope = cuts.slopes[segment], cuts.slopes[segment + 1]
     return Nodes(
-        t=t,
-        weight=plan.weight * (right - left),
-        segment=plan.segment,
-        fraction=plan.fraction,
-        held=edges.segment[plan.segment],
-        slope=left_slope + inner * (right_slope - left_slope),
-        weight_slope=plan.weight[:, None] * (right_slope - left_slope),
+        t=np.where(fraction == 1.0, right, left + fraction * (right - left)),
+        weight=share * (right - left),
+        segment=segment,
+        fraction=fraction,
+        held=cuts.segment[segment],
+        slope=left_slope + fraction[:, None] * (right_slope - left_slope),
+        weight_slope=share[:, None] * (right_slope - left_slope),
     )
+
+
+def moved(nodes: Nodes, cuts: Cuts, points: Sequence[tuple[int, float]]) -> tuple[Nodes, dict[tuple[int, float], int]]:
+    """Nodes between cuts whose derivatives are known, with further ones (segment, fraction) of no weight.
+
+    Returns
+    -------
+    nodes, and which one each of the points is
+    """
+    segment = np.append(nodes.segment, [point[0] for point in points]).astype(np.int_)
+    fraction = np.append(nodes.fraction, [point[1] for point in points])
+    share = np.append(nodes.weight / np.diff(cuts.times)[nodes.segment], np.zeros(len(points)))
+    order = np.lexsort((fraction, segment))
+    found = np.argsort(order)[len(nodes) :].tolist()
+    return place(cuts, segment[order], fraction[order], share[order]), dict(zip(points, found, strict=True))
 
 
 def fixed_nodes(t: Array, segment: NDArray[np.int_], held: NDArray[np.int_], directions: int = 0) -> Nodes:
@@ -193,11 +177,3 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
 def part_of_nodes(nodes: Nodes, part: slice | NDArray[np.int_]) -> Nodes:
     """Some of the nodes."""
     return Nodes(**{item.name: getattr(nodes, item.name)[part] for item in fields(Nodes)})
-
-
-def find(edges: Edges, time: float) -> tuple[int, float]:
-    """Interval and fraction of a time; an edge belongs to the interval after it."""
-    last = len(edges.times) - 2
-    k = min(max(int(np.searchsorted(edges.times, time, side="right")) - 1, 0), last)
-    left, right = float(edges.times[k]), float(edges.times[k + 1])
-    return k, min(max((time - left) / (right - left), 0.0), 1.0)

@@ -1,7 +1,6 @@
 """Panels of a run for quadratures: its own steps, cut finer where its signals need it.
 
-In: ends of the steps of a run, and signals along the nodes of coarser panels.  Out: `Panels`, and the `NodePlan` of
-their nodes.
+In: ends of the steps of a run, and signals along the nodes of coarser panels.  Out: `Panels`, and their `Nodes`.
 
 The integrator chooses its steps so that the motion is smooth within each; where it ends them on the kinks of the laws,
 so do the panels.  Outputs may be rougher than states: Gauss's rule of four nodes is exact for polynomials of degree
@@ -11,12 +10,12 @@ seven, and the size of the part of third degree at its nodes gives how many time
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import APART, Edges, NodePlan
+from ballpass.runtime.quantity.nodes import APART, Cuts, Nodes, place
 
 Array = NDArray[np.float64]
 
@@ -59,7 +58,7 @@ NEAR_KINK = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Panels:
-    """Panels within intervals between edges, in order of time.
+    """Panels within intervals between cuts, in order of time.
 
     A panel is a part of a span in s, which goes from 0 to 1 over the span.  After a kink the place in the span is
     ``s^2``, before one ``1 - (1 - s)^2``, between two ``s^2 (3 - 2 s)``, else s: a function that grows like the square
@@ -110,20 +109,8 @@ class Panels:
         return self.low[:, None] + span * place, span * width * rate
 
 
-def uniform_panels(edges: Edges, turn: float, turned: Turned | None) -> Panels:
-    """Panels of about one length over the time that counts.
-
-    Parameters
-    ----------
-    turn : time of a turn, infinite where nothing turns [s]
-    turned : as for `panels_of_steps`
-    """
-    none = np.zeros(0, dtype=bool)
-    return panels_of_steps(edges, np.zeros(0), none, turn, turned)
-
-
-def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None) -> Panels:
-    """Panels that are steps; parts of them where a step is longer than a panel of `uniform_panels`.
+def panels_of_steps(cuts: Cuts, ends: Array, kinks: NDArray[np.bool_], turn: float, turned: Turned | None) -> Panels:
+    """Panels that are steps; parts of them where a step is longer than a panel of even ones.
 
     A step is as long as its states allow, which may be turns where a table gives the speed and nothing else moves.
 
@@ -134,46 +121,50 @@ def panels_of_steps(edges: Edges, ends: Array, kinks: NDArray[np.bool_], turn: f
     turn : time of a turn, infinite where nothing turns [s]
     turned : turns of a driver whose speed changes, until times; None where it does not change
     """
-    panels, lengths = panels_between(edges, ends, kinks), np.diff(edges.times)
-    longest = min(turn, float(np.sum(lengths[edges.first :]))) / FEWEST
+    panels, lengths = cut_at(whole_panels(cuts), cuts, ends, kinks), np.diff(cuts.times)
+    longest = min(turn, float(np.sum(lengths[cuts.first :]))) / FEWEST
     places = panels.at(np.array([0.0, 0.5, 1.0]))[0] * lengths[panels.segment][:, None]
     parts = (places[:, 2] - places[:, 0]) / longest
     if turned is not None:
-        times = edges.times[panels.segment][:, None] + places
+        times = cuts.times[panels.segment][:, None] + places
         # both halves: the driver may turn back within a step
         parts = np.maximum(parts, FEWEST * np.sum(np.abs(np.diff(turned(times), axis=1)), axis=1))
     return split(panels, np.maximum(np.ceil(parts * (1.0 - 1e-9)), 1).astype(int))
 
 
-def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panels:
-    """Panels over the time that counts that end at `cuts` and at the edges.
+def whole_panels(cuts: Cuts) -> Panels:
+    """A panel for each interval of the time that counts."""
+    whole = np.arange(cuts.first, len(cuts.times) - 1)
+    zeros, ones, none = np.zeros(len(whole)), np.ones(len(whole)), np.zeros((len(whole), 2), dtype=bool)
+    return Panels(segment=whole, low=zeros, high=ones, kinked=none, begin=zeros, end=ones)
+
+
+def cut_at(panels: Panels, cuts: Cuts, times: Array, kinks: NDArray[np.bool_] | None = None) -> Panels:
+    """The same panels, cut at further times; those that are not near to one keep their bits.
 
     Parameters
     ----------
-    cuts : increasing, shape (cuts,) [s]
-    kinks : whether outputs have a kink there, shape (cuts,)
+    times : shape (times,) [s]
+    kinks : whether channels have a kink there, shape (times,).  Default: at all
     """
-    whole = np.arange(edges.first, len(edges.times) - 1)
-    segment, fraction, inside = _places(edges, cuts)
-    lengths = np.diff(edges.times)
+    if not len(times):
+        return panels
+    kinks = np.ones(len(times), dtype=bool) if kinks is None else kinks
+    segment, fraction = cuts.find(times)
+    inside = (segment >= cuts.first) & (fraction > APART) & (fraction < 1.0 - APART)
+    lengths = np.diff(cuts.times)
     sides = np.zeros((len(lengths), 2), dtype=bool)  # whether a kink is at the low and at the high end
-    for shift in (-1, 0, 1):  # one beside an edge is at the ends of both intervals that it parts
+    for shift in (-1, 0, 1):  # one beside a cut is at the ends of both intervals that it parts
         k = np.clip(segment[kinks] + shift, 0, len(lengths) - 1)[:, None] + np.arange(2)
-        np.logical_or.at(sides, k[:, 0], np.abs(cuts[kinks][:, None] - edges.times[k]) <= APART * lengths[k[:, :1]])
-    inside &= segment >= edges.first
+        np.logical_or.at(sides, k[:, 0], np.abs(times[kinks][:, None] - cuts.times[k]) <= APART * lengths[k[:, :1]])
+    last, first = panels.end == 1.0, np.diff(panels.segment, prepend=-1) > 0
+    ends = np.where(last, panels.high, panels.at(np.ones(1))[0][:, 0])
+    low, high = (panels.kinked | sides[panels.segment] & np.stack([first, ends == 1.0], axis=1)).T
     return _spans(
-        np.concatenate([whole, segment[inside], whole]),
-        np.concatenate([np.zeros(len(whole)), fraction[inside], np.ones(len(whole))]),
-        np.concatenate([sides[whole, 0], kinks[inside], sides[whole, 1]]),
+        np.concatenate([panels.segment[first], panels.segment, segment[inside]]),
+        np.concatenate([panels.low[first], ends, fraction[inside]]),
+        np.concatenate([low[first], high & last, kinks[inside]]),
     )
-
-
-def _places(edges: Edges, times: Array) -> tuple[NDArray[np.int_], Array, NDArray[np.bool_]]:
-    """Intervals of times, fractions of them, and whether these are apart from the edges."""
-    segment = np.clip(np.searchsorted(edges.times, times, side="right") - 1, 0, len(edges.times) - 2)
-    left, right = edges.times[segment], edges.times[segment + 1]
-    near = APART * (right - left)
-    return segment, (times - left) / (right - left), (times > left + near) & (times < right - near)
 
 
 def _spans(segment: NDArray[np.int_], ends: Array, at: NDArray[np.bool_]) -> Panels:
@@ -223,17 +214,11 @@ def split(panels: Panels, parts: NDArray[np.int_]) -> Panels:
     """Each panel in so many equal parts."""
     if np.all(parts == 1):
         return panels  # itself
-    first = np.repeat(np.cumsum(parts) - parts, parts)
-    place = np.arange(int(np.sum(parts))) - first
-    begin, end, of = (np.repeat(item, parts) for item in (panels.begin, panels.end, parts))
-    ends = [np.where(k == of, end, begin + (end - begin) * k / of) for k in (place, place + 1)]
-    return Panels(
-        segment=np.repeat(panels.segment, parts),
-        low=np.repeat(panels.low, parts),
-        high=np.repeat(panels.high, parts),
-        kinked=np.repeat(panels.kinked, parts, axis=0),
-        begin=ends[0],
-        end=ends[1],
+    of = np.repeat(np.arange(len(panels)), parts)
+    each, parts, k = panels.some(of), parts[of], np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)
+    begin, width = each.begin, each.end - each.begin
+    return replace(
+        each, begin=begin + width * k / parts, end=np.where(k + 1 == parts, each.end, begin + width * (k + 1) / parts)
     )
 
 
@@ -254,18 +239,18 @@ def parts_needed(signals: Sequence[Array], rough: float) -> NDArray[np.int_]:
     return np.clip(np.ceil(np.cbrt(most / rough)), 1, PARTS).astype(np.int_)
 
 
-def parts_of_oscillation(panels: Panels, edges: Edges, frequency: float) -> NDArray[np.int_]:
+def parts_of_oscillation(panels: Panels, cuts: Cuts, frequency: float) -> NDArray[np.int_]:
     """Into how many parts each panel is to be split where a signal is multiplied with an oscillation, shape (panels,).
 
     Parameters
     ----------
     frequency : of the oscillation [Hz]
     """
-    lengths = np.diff(panels.at(np.array([0.0, 1.0]))[0])[:, 0] * np.diff(edges.times)[panels.segment]
+    lengths = np.diff(panels.at(np.array([0.0, 1.0]))[0])[:, 0] * np.diff(cuts.times)[panels.segment]
     return np.maximum(np.ceil(lengths * (2.0 * np.pi * frequency / TURNING)), 1).astype(np.int_)
 
 
-def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:
+def interpolated(panels: Panels, cuts: Cuts, signals: Array) -> tuple[Array, NDArray[np.int_], Array]:
     """Times of places in each panel, both ends among them, the panels' indices, and signals there.
 
     Parameters
@@ -276,7 +261,7 @@ def interpolated(panels: Panels, edges: Edges, signals: Array) -> tuple[Array, N
     -------
     shapes (places,) [s], (places,) and (places, columns)
     """
-    left, right = edges.times[panels.segment], edges.times[panels.segment + 1]
+    left, right = cuts.times[panels.segment], cuts.times[panels.segment + 1]
     times = left[:, None] + panels.at(BETWEEN)[0] * (right - left)[:, None]
     values = (_TO_BETWEEN @ signals).reshape(times.size, signals.shape[2])
     return times.ravel(), np.repeat(np.arange(len(panels)), len(BETWEEN)), values
@@ -297,35 +282,19 @@ def bounds(signals: Array) -> tuple[Array, Array]:
     return low - beyond, high + beyond
 
 
-def cut_at(panels: Panels, edges: Edges, times: Array) -> Panels:
-    """The same panels, cut at kinks; those that are not near to one keep their bits."""
-    if not len(times):
-        return panels
-    last, first = panels.end == 1.0, np.diff(panels.segment, prepend=-1) > 0
-    ends = np.where(last, panels.high, panels.at(np.ones(1))[0][:, 0])
-    segment, fraction, inside = _places(edges, times)
-    return _spans(
-        np.concatenate([panels.segment[first], panels.segment, segment[inside]]),
-        np.concatenate([panels.low[first], ends, fraction[inside]]),
-        np.concatenate(
-            [panels.kinked[first, 0], panels.kinked[:, 1] & last, np.ones(np.count_nonzero(inside), dtype=bool)]
-        ),
-    )
-
-
-def plan_of(panels: Panels, edges: Edges) -> NodePlan:
-    """Nodes of Gauss's rule in each panel, and both sides of each edge, in order of time."""
-    place, rate = panels.at(GAUSS)
-    whole = np.arange(edges.first, len(edges.times) - 1)
+def nodes_of(panels: Panels, cuts: Cuts) -> Nodes:
+    """Nodes of Gauss's rule in each panel, and both sides of each cut, in order of time."""
+    part, rate = panels.at(GAUSS)
+    whole = np.arange(cuts.first, len(cuts.times) - 1)
     count = len(GAUSS) * len(panels) + 2 * len(whole)
-    segment, fraction, weight = np.empty(count, dtype=np.int_), np.empty(count), np.zeros(count)
+    segment, fraction, share = np.empty(count, dtype=np.int_), np.empty(count), np.zeros(count)
     inner = inner_nodes(panels)
-    segment[inner], fraction[inner], weight[inner] = panels.segment[:, None], place, WEIGHTS * rate
+    segment[inner], fraction[inner], share[inner] = panels.segment[:, None], part, WEIGHTS * rate
     for side in (0.0, 1.0):
         ends = np.searchsorted(panels.segment, whole, side="right" if side else "left") * len(GAUSS)
         ends += 2 * np.arange(len(whole)) + int(side)
         segment[ends], fraction[ends] = whole, side
-    return NodePlan(segment=segment, fraction=fraction, weight=weight)
+    return place(cuts, segment, fraction, share)
 
 
 def inner_nodes(panels: Panels) -> NDArray[np.int_]:

@@ -22,25 +22,21 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import EXTREMES, reduction_rows
-from ballpass.runtime.quantity.between_nodes import Extreme
-from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, channels_of, is_reduced, kind_of, needed_rows
-from ballpass.runtime.quantity.location import Moment, place_of, place_slope
-from ballpass.runtime.quantity.nodes import (
-    Edges,
-    NodePlan,
-    Nodes,
-    find,
-    joined_nodes,
-    make_edges,
-    no_nodes,
-    place,
-    with_passages,
-    with_points,
+from ballpass.runtime.quantity.cuts import moving_cuts
+from ballpass.runtime.quantity.layout import (
+    Layout,
+    NodeLayer,
+    around,
+    channels_of,
+    is_reduced,
+    kind_of,
+    moments,
+    needed_rows,
 )
+from ballpass.runtime.quantity.nodes import Cuts, Nodes, joined_nodes, moved, part_of_nodes
 from ballpass.runtime.quantity.panels import GAUSS, ROUGH
-from ballpass.runtime.quantity.passages import JumpDistance, jumps_at, jumps_at_edges, passage_slopes
 from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
-from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
+from ballpass.runtime.quantity.track import ChannelValues, Track, jumps, part_of_track
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.request.locating import stepper_for
 from ballpass.runtime.request.request import check_memory
@@ -49,9 +45,6 @@ from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.loop import KeptSteps, ReductionRow, Sink, start_run
 
 Array = NDArray[np.float64]
-
-#: Fractions nearer than this to an edge are at it.
-AT_EDGE = 1e-12
 
 #: Numbers in memory for each state at a node, and those that each direction adds: states, channels, and intermediate
 #: values.  Lanes without a direction are counted where they are made.
@@ -177,35 +170,28 @@ class QuantityRun:
         found, layouts = self._measure(run, self._moving, len(names))
         laid = []
         for layout in layouts:
-            edges, leaves = self._moving_edges(run, layout, chain, sensitivity_rtol)
-            laid += [_Differentiated(run, part, edges, chain, leaves) for part in _by_nodes(layout)]
+            angles = self._layer.angles_of(layout)
+            cuts, leaves = moving_cuts(layout.motion, layout.cuts, angles, chain, sensitivity_rtol)
+            laid += [(part, leaves, *_moving_nodes(part, cuts, chain)) for part in _by_nodes(layout)]
         slopes: dict[str, Estimate] = {}
         growth = 0.0
         for still in (False, True):
-            some = [one for one in laid if one.layout.still is still]
+            some = [one for one in laid if one[0].motion.still is still]
             if not some:
                 continue
-            segments, nodes = some[0].layout.segments, joined_nodes([one.nodes for one in some])
             # in one run for all
-            track = follow(run, segments, some[0].edges, nodes, chain, sensitivity_rtol, still=still)
+            every = joined_nodes([nodes for _, _, nodes, _ in some])
+            track = some[0][0].motion.along(every, chain, sensitivity_rtol)
             growth = max(growth, track.growth)
             first = 0
-            for one in some:
-                count = len(one.nodes)
-                channels = self._channels.only(channels_of(one.layout.items))
-                signals = channels.along(part_of_track(track, slice(first, first + count)), run.numbers, chain)
-                first += count
+            for layout, leaves, nodes, marks in some:
+                part = part_of_track(track, slice(first, first + len(nodes)))
+                first += len(nodes)
+                signals = self._channels.only(channels_of(layout.items)).along(part, run.numbers, chain)
                 view = View(
-                    run=run,
-                    nodes=one.nodes,
-                    signals=signals,
-                    marks=one.marks,
-                    slopes=chain.derivative,
-                    names=chain.names,
+                    run=run, nodes=nodes, signals=signals, marks=marks, slopes=chain.derivative, names=chain.names
                 )
-                slopes |= {
-                    item.name: _where_known(_evaluated(view, item), item, one.leaves) for item in one.layout.items
-                }
+                slopes |= {item.name: _where_known(_evaluated(view, item), item, leaves) for item in layout.items}
         estimates = []
         for item, plain in zip(self.quantities, found.estimates, strict=True):
             if item.name in slopes:
@@ -246,13 +232,14 @@ class QuantityRun:
             self._check_memory(directions, max(len(kept), math.ceil(run.span.cycles)))
             layouts = self._layer.lay(run, kept, row, noded)
             for layout in layouts:
-                view = self._plain_view(run, layout)
+                marks = {key: some[0] for key, some in layout.marks.items()}
+                view = View(run=run, nodes=layout.track.nodes, signals=layout.signals, marks=marks)
                 found |= {item.name: _evaluated(view, item) for item in layout.items if item not in self._reduced}
         rows, end = row[None, :], state[None, :]
         runs = ReducedRuns(manifest=self.model.manifest, rows=rows, end=end, values=run.numbers.values)
         found |= {item.name: _of_reductions(runs, item) for item in self._reduced}
         estimates = tuple(found.get(item.name) or self._at_rest(item, run, None) for item in self.quantities)
-        track = next((one.track for one in layouts if not one.still and one.track is not None), None)
+        track = next((one.track for one in layouts if one.causes and not one.motion.still), None)
         values = EvaluatedQuantities(
             estimates=estimates,
             track=track,
@@ -263,16 +250,6 @@ class QuantityRun:
             rejected=rejected,
         )
         return values, layouts
-
-    def _plain_view(self, run: Run, layout: Layout) -> View:
-        """Data for kinds, of a run without derivatives."""
-        nodes, marks = _with_moments(run, layout, layout.edges, place(layout.plan, layout.edges), None)
-        signals = layout.signals
-        if layout.track is None:
-            track = follow(run, layout.segments, layout.edges, nodes, kept=layout.kept, still=layout.still)
-            signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
-        marks |= {key: _plain_mark(some[0]) for key, some in layout.extremes.items()}
-        return View(run=run, nodes=nodes, signals=signals, marks=marks, slopes=lambda _: np.zeros(0), names=())
 
     def _check_memory(self, directions: int, steps: int) -> None:
         """Refuse steps whose nodes would not fit into memory, before any is laid."""
@@ -292,48 +269,36 @@ class QuantityRun:
             needed |= {(name, state) for name in EXTREMES for state in self.model.states}
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed, run.rtol)[0])
 
-    def _moving_edges(
-        self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float
-    ) -> tuple[Edges, NDArray[np.bool_]]:
-        """Edges of a layout that move with the parameters; see `jumps_at_edges`."""
-        edges, track = make_edges(run, layout.segments, chain), layout.track
-        leaves = np.zeros(len(chain.names), dtype=bool)
-        if any(kind_of(item).integrates and jumps_at(item.channel) is not None for item in layout.items):
-            assert track is not None
-            angle = JumpDistance(self._channels.only(channels_of(layout.items)))
-            edges, leaves = jumps_at_edges(run, track, edges, angle, chain, sensitivity_rtol, still=layout.still)
-        for passages in layout.passages:
-            assert track is not None
-            slopes = passage_slopes(run, track, passages, chain, sensitivity_rtol, still=layout.still)
-            edges = with_passages(edges, passages.times, slopes)
-        return edges, leaves
-
     def _at_rest(self, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
         at_rest = kind_of(quantity).at_rest
         assert at_rest is not None  # all others are evaluated along the run
         return at_rest(self.model, run.numbers, quantity, chain)
 
 
-class _Differentiated:
+def _moving_nodes(layout: Layout, cuts: Cuts, chain: Chain) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
     """Nodes of a layout that move with the parameters, and the moments among them."""
+    if not layout.causes:
+        return moments(layout.motion.run, cuts, layout.items, chain)
+    beside = {
+        (item.name, kind): around(layout, layout.marks[item.name, kind][0])
+        for item in layout.items
+        for kind in kind_of(item).extremes
+        if kind_of(item).around
+    }
+    points = [(one.segment, one.fraction) for some in layout.marks.values() for one in some]
+    points = list(dict.fromkeys([*points, *(point for some in beside.values() for point in some)]))
+    integrated = any(kind_of(item).integrates for item in layout.items)
+    nodes, known = moved(part_of_nodes(layout.track.nodes, slice(None if integrated else 0)), cuts, points)
 
-    def __init__(self, run: Run, layout: Layout, edges: Edges, chain: Chain, leaves: NDArray[np.bool_]) -> None:
-        self.layout, self.edges, self.leaves = layout, edges, leaves
-        beside = {
-            (item.name, kind): around(layout, layout.extremes[item.name, kind][0])
-            for item in layout.items
-            for kind in kind_of(item).extremes
-            if kind_of(item).around
-        }
-        points = [(one.segment, one.fraction) for some in layout.extremes.values() for one in some]
-        points += [point for some in beside.values() for point in some]
-        integrated = any(kind_of(item).integrates for item in layout.items)
-        plan = with_points(layout.plan if integrated else no_nodes(), list(dict.fromkeys(points)))
-        self.nodes, self.marks = _with_moments(run, layout, self.edges, place(plan, self.edges), chain)
-        for key, some in layout.extremes.items():
-            best, *others = (_mark(one, plan) for one in some)
-            nodes = tuple(_node(plan, point) for point in beside.get(key, ()))
-            self.marks[key] = replace(best, competing=tuple(others), around=nodes)
+    def at_node(mark: Mark) -> Mark:
+        return replace(mark, node=known[mark.segment, mark.fraction])
+
+    marks = {}
+    for key, some in layout.marks.items():
+        best, *others = map(at_node, some)
+        nearby = tuple(known[point] for point in beside.get(key, ()))
+        marks[key] = replace(best, competing=tuple(others), around=nearby)
+    return nodes, marks
 
 
 def _by_nodes(layout: Layout) -> list[Layout]:
@@ -342,9 +307,9 @@ def _by_nodes(layout: Layout) -> list[Layout]:
     for integrated in (True, False):
         items = tuple(item for item in layout.items if kind_of(item).integrates is integrated)
         names = {item.name for item in items}
-        extremes = {key: some for key, some in layout.extremes.items() if key[0] in names}
+        marks = {key: some for key, some in layout.marks.items() if key[0] in names}
         if items:
-            parts.append(replace(layout, items=items, extremes=extremes))
+            parts.append(replace(layout, items=items, marks=marks))
     return parts
 
 
@@ -362,24 +327,6 @@ def _where_known(found: Estimate, quantity: Quantity, leaves: NDArray[np.bool_])
     return replace(found, slope=np.where(leaves, np.nan, found.slope), notes=notes)
 
 
-def _with_moments(
-    run: Run, layout: Layout, edges: Edges, nodes: Nodes, chain: Chain | None
-) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
-    """Nodes, and those of the moments asked for."""
-    marks: dict[tuple[str, str], Mark] = {}
-    manifest = run.model.manifest
-    for item in layout.items:
-        if not kind_of(item).at_moment:
-            continue
-        time, moment = place_of(manifest, run.numbers, run.end, item)
-        slope = edges.slopes[-1]
-        if chain is not None:
-            slope = place_slope(manifest, run.numbers, moment, time, slope, chain.derivative)
-        marks[item.name, "place"] = Mark(node=len(nodes), time=time, value=math.nan, ball=0)
-        nodes = _appended(nodes, edges, time, slope, moment)
-    return nodes, marks
-
-
 def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
     kind = kind_of(quantity)
     assert kind.reduced is not None
@@ -390,41 +337,3 @@ def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
             time = float(runs.entry(f"{which}_time", quantity.channel)[0])
             ball = int(runs.entry(f"{which}_ball", quantity.channel)[0]) or None
     return Estimate(value=float(kind.reduced(runs, quantity)[0]), slope=np.zeros(0), time=time, ball=ball)
-
-
-def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, moment: Moment) -> Nodes:
-    """Nodes with one more at a time of its own; at an edge the loads after it hold, at the end those before."""
-    segment, _ = find(edges, time)
-    return Nodes(
-        t=np.append(nodes.t, edges.times[-1] if moment.kind == "end" else time),
-        weight=np.append(nodes.weight, 0.0),
-        segment=np.append(nodes.segment, segment),
-        fraction=np.append(nodes.fraction, math.nan),
-        held=np.append(nodes.held, edges.segment[segment]),
-        slope=np.vstack([nodes.slope, slope[None, :]]),
-        weight_slope=np.vstack([nodes.weight_slope, np.zeros((1, len(slope)))]),
-    )
-
-
-def _node(plan: NodePlan, point: tuple[int, float]) -> int:
-    """The node of a plan that has this interval and fraction."""
-    return int(np.flatnonzero((plan.segment == point[0]) & (plan.fraction == point[1]))[0])
-
-
-def _mark(extreme: Extreme, plan: NodePlan) -> Mark:
-    """An extreme, with its node in a plan that has its point."""
-    return replace(_plain_mark(extreme), node=_node(plan, (extreme.segment, extreme.fraction)))
-
-
-def _plain_mark(extreme: Extreme) -> Mark:
-    """An extreme whose node does not matter: no derivative is asked for."""
-    return Mark(
-        node=0,
-        time=extreme.time,
-        value=extreme.value,
-        ball=extreme.column,
-        other=extreme.other,
-        rate=extreme.rate,
-        other_rate=extreme.other_rate,
-        at_edge=min(extreme.fraction, 1.0 - extreme.fraction) < AT_EDGE,
-    )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Chain
 
 Array = NDArray[np.float64]
+
+#: Fractions nearer than this to a cut are at it.
+AT_EDGE = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,27 +127,33 @@ class Mark:
 
     Attributes
     ----------
-    node : its node
     time : [s]
     value : of the channel there
     ball : column of the channel
+    segment, fraction : interval between cuts, and place within it
     other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
-    rate, other_rate : time derivatives of both columns there, where there is another
-    at_edge : whether the extreme lies at an edge of a load or of the window
+    rate, other_rate : time derivatives of both columns there, where there is another [channel's unit / s]
+    node : its node
     around : nodes at equal distances before and after it, the same number of both
     competing : the next extremes elsewhere in the run
     """
 
-    node: int
     time: float
-    value: float
-    ball: int
+    value: float = math.nan
+    ball: int = 0
+    segment: int = 0
+    fraction: float = math.nan
     other: int | None = None
     rate: float = 0.0
     other_rate: float = 0.0
-    at_edge: bool = False
+    node: int = 0
     around: tuple[int, ...] = ()
     competing: tuple[Mark, ...] = ()
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether it lies at a cut that moves: an edge of a load or of the window."""
+        return min(self.fraction, 1.0 - self.fraction) < AT_EDGE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,9 +172,9 @@ class View:
     run: Run
     nodes: Nodes
     signals: Mapping[str, Signal]
-    marks: Mapping[tuple[str, str], Mark]
-    slopes: Callable[[str], Array]
-    names: tuple[str, ...]
+    marks: Mapping[tuple[str, str], Mark] = field(default_factory=dict)
+    slopes: Callable[[str], Array] = lambda _: np.zeros(0)
+    names: tuple[str, ...] = ()
 
     @property
     def manifest(self) -> Manifest:

@@ -1,6 +1,6 @@
 """Follow a run along nodes: states and outputs there, with their derivatives along parameters.
 
-In: a run, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked for.
+In: a run and nodes.  Out: a `Track`, and `Signal` for each channel asked for.
 
 Derivatives are taken along the moving nodes: with x' at fixed time and the node's own t', that of the state is
 ``x' + f t'``.  Across an edge where a load switches x' jumps by ``(f_before - f_behind) t_edge'``, and the sum does
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import casadi
@@ -23,8 +23,8 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.point.jacobian import rows_of
-from ballpass.runtime.quantity.nodes import Edges, Nodes, part_of_nodes
+from ballpass.runtime.point.jacobian import Rows, rows_of
+from ballpass.runtime.quantity.nodes import Nodes, fixed_nodes, part_of_nodes
 from ballpass.runtime.request.locating import stepper_for
 from ballpass.runtime.request.request import no_output
 from ballpass.runtime.request.resolve import Run
@@ -40,6 +40,9 @@ Array = NDArray[np.float64]
 #: Nodes whose derivatives are held in memory at once.
 BLOCK = 4096
 
+#: Channel of the angles beyond the edges of all windows of angles that are states, and its generated function [rad].
+WINDOWS = "windows"
+
 #: Expressions of CasADi are not for several threads, and its calls let others run: they are made one at a time.
 _MAKING = threading.Lock()
 
@@ -50,7 +53,7 @@ class Track:
 
     Attributes
     ----------
-    nodes, edges : where
+    nodes : where
     x : states, shape (nodes, states)
     slope : their derivatives along the moving nodes, shape (nodes, states, directions)
     local : time since the segment's start, shape (nodes,) [s]
@@ -61,7 +64,6 @@ class Track:
     """
 
     nodes: Nodes
-    edges: Edges
     x: Array
     slope: Array
     local: Array
@@ -84,67 +86,72 @@ class Signal:
     slope: Array
 
 
-def follow(
-    run: Run,
-    segments: Segments,
-    edges: Edges,
-    nodes: Nodes,
-    chain: Chain | None = None,
-    sensitivity_rtol: float | None = None,
-    *,
-    kept: Array | None = None,
-    still: bool = False,
-) -> Track:
-    """States at the nodes; with derivatives along the directions of `chain`.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """A run, to be followed along nodes.
 
-    Parameters
+    Attributes
     ----------
-    segments : all of the run
-    sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
-    kept : steps of the run, which is then not made again; not with derivatives
-    still : nothing that is evaluated depends on the states, which stay zero
-
-    Raises
-    ------
-    RunFailed
-        The driver could not reach the end.
+    run, segments : the run, all segments of its driver
+    kept : its steps, see `loop.KeptSteps`; needed without derivatives alone
+    still : whether nothing that is evaluated depends on states
     """
-    model, numbers = run.model, run.numbers
-    count, directions = len(model.states), 0 if chain is None else len(chain.names)
-    local, u = nodes.t - segments.times[nodes.held], segments.inputs[nodes.held]
-    slope = np.zeros((len(nodes), count, directions))
-    if still:
-        empty = np.zeros((len(nodes), count))
-        return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=u, segments=segments)
-    if kept is not None and np.all(nodes.t[1:] >= nodes.t[:-1]):
-        x = stepper_for(model, run.kinks).read(kept, nodes.t)
-        return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments)
-    times, back = np.unique(nodes.t, return_inverse=True)
-    if kept is not None:
-        x = stepper_for(model, run.kinks).read(kept, times)[back]
-        return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments)
-    made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks, run.magnitude)
-    if made is not None and sensitivity_rtol is not None:
-        made.control(sensitivity_rtol, run.magnitude)
-    near = time_resolution(run.begin, run.end, run.stretch)
-    samples = Samples(times=times, x=np.empty((len(times), count)), near=near, end=run.end, directions=made)
-    start_run(run, [samples]).go_on()
-    states, growth = samples.x, 0.0
-    if made is not None:
-        # the driver gives the derivative before the edge
-        before = np.clip(np.searchsorted(segments.times, times, side="left") - 1, 0, None)
-        given = {
-            "t": times - segments.times[before],
-            "x": states,
-            "u": segments.inputs[before],
-            "p": numbers.p,
-            "c": numbers.c,
-        }
-        rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
-        slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
-        growth = made.growth()
-    x = states[back]
-    return Track(nodes=nodes, edges=edges, x=x, slope=slope, local=local, u=u, segments=segments, growth=growth)
+
+    run: Run
+    segments: Segments
+    kept: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    still: bool = False
+
+    def along(self, nodes: Nodes, chain: Chain | None = None, sensitivity_rtol: float = 0.0) -> Track:
+        """States at nodes; with derivatives along the directions of `chain`, for which the run is made again.
+
+        Parameters
+        ----------
+        sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
+
+        Raises
+        ------
+        RunFailed
+            The driver could not reach the end.
+        """
+        run, model, numbers, starts = self.run, self.run.model, self.run.numbers, self.segments.times
+        count, directions = len(model.states), 0 if chain is None else len(chain.names)
+        x, slope, growth = np.zeros((len(nodes), count)), np.zeros((len(nodes), count, directions)), 0.0
+        times, back = np.unique(nodes.t, return_inverse=True)
+        if chain is None and not self.still:
+            x = stepper_for(model, run.kinks).read(self.kept, times)[back]
+        elif chain is not None and not self.still:
+            made = Directions(model, numbers, chain.names, len(times), run.kinks, run.magnitude)
+            made.control(sensitivity_rtol, run.magnitude)
+            near = time_resolution(run.begin, run.end, run.stretch)
+            samples = Samples(times=times, x=np.empty((len(times), count)), near=near, end=run.end, directions=made)
+            start_run(run, [samples]).go_on()
+            # the driver gives the derivative before the edge
+            before = np.clip(np.searchsorted(starts, times, side="left") - 1, 0, None)
+            given = {
+                "t": times - starts[before],
+                "x": samples.x,
+                "u": self.segments.inputs[before],
+                "p": numbers.p,
+                "c": numbers.c,
+            }
+            rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
+            slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
+            x, growth = samples.x[back], made.growth()
+        return Track(
+            nodes=nodes,
+            x=x,
+            slope=slope,
+            local=nodes.t - starts[nodes.held],
+            u=self.segments.inputs[nodes.held],
+            segments=self.segments,
+            growth=growth,
+        )
+
+    def nodes_at(self, times: Array, directions: int = 0) -> Nodes:
+        """Nodes at fixed times; at an edge those before it."""
+        held = np.clip(np.searchsorted(self.segments.times, times) - 1, 0, None)
+        return fixed_nodes(times, held, held, directions)
 
 
 def part_of_track(track: Track, part: slice) -> Track:
@@ -185,18 +192,17 @@ class ChannelValues:
         self._model = model
         known = list(dict.fromkeys((*model.states, *model.outputs, *(q.name for q in model.manifest.quantities))))
         for name in channels:
-            if name not in known:
+            if name not in (*known, WINDOWS):
                 raise RequestError(no_output(model.manifest, name, known))
         self.channels = tuple(dict.fromkeys(channels))
         self._outputs = [info for info in model.manifest.outputs if info.name in self.channels]
         self._outputs = [info for info in self._outputs if info.name not in model.states]
         own = {*model.states, *model.outputs}
-        self._more = [rows for name in self.channels if name not in own for rows in rows_of(model, name)]
+        self._more = [rows for name in self.channels if name not in own for rows in _rows(model, name)]
         self._columns = [(info.name, info.size) for info in self._outputs]
         self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
         self._own = threading.local()  # a loop is not for several threads, and differences run in several
         self._functions: dict[str, casadi.Function] = {}
-        self._derivatives: dict[int, Loop] = {}
         self._parts: dict[tuple[str, ...], ChannelValues] = {}
 
     def only(self, channels: Collection[str]) -> ChannelValues:
@@ -247,7 +253,7 @@ class ChannelValues:
     def with_rates(self, track: Track, numbers: Numbers) -> tuple[Array, Array]:
         """Channels that are no states along a track, and their time derivatives, shape (nodes, columns) each.
 
-        They follow from time and positions alone.
+        They follow from time and positions alone, and from the angle by which a cage lags.
         """
         every = self._own_loop("rates", self._rows_with_rates)(len(track.nodes), self._given(track, numbers))["g"]
         values, rates = np.split(every, 2, axis=1)
@@ -260,15 +266,13 @@ class ChannelValues:
 
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         directions = len(chain.names)
-        if directions not in self._derivatives:
-            self._derivatives[directions] = self._loop(directions)
-        loop, moved = self._derivatives[directions], chain.inputs(track.segments.times)
+        loop = self._own_loop(f"along {directions}", self._all_rows, directions)
+        moved = chain.inputs(track.segments.times)
         values, slopes = [], []
         for first in range(0, len(track.nodes), BLOCK):
-            part = slice(first, first + BLOCK)
-            given = {"t": track.local[part], "x": track.x[part], "u": track.u[part], "p": numbers.p, "c": numbers.c}
-            seeds = (track.nodes.slope[part], track.slope[part], moved[track.nodes.held[part]], chain.p, chain.c)
-            count = len(given["t"])
+            part = part_of_track(track, slice(first, first + BLOCK))
+            given, count = self._given(part, numbers), len(part.nodes)
+            seeds = (part.nodes.slope, part.slope, moved[part.nodes.held], chain.p, chain.c)
             here = loop(count, given | {f"{name}_way": seed for name, seed in zip(given, seeds, strict=True)})
             values.append(here["g"])
             slopes.append(here["g_way"].reshape(count, -1, directions))
@@ -280,20 +284,19 @@ class ChannelValues:
             column += size
         return found
 
-    def _own_loop(self, name: str, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]]) -> Loop:
-        """A loop of this thread over a function that all threads share."""
+    def _own_loop(
+        self, name: str, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], directions: int = 0
+    ) -> Loop:
+        """A loop of this thread over a function of `_function`, which all threads share."""
         loop = getattr(self._own, name, None)
         if loop is None:
+            moving = ("t_way", "x_way", "u_way") if directions else ()
             with _MAKING:
                 if name not in self._functions:
-                    self._functions[name] = self._function(rows)
-                loop = Loop(self._functions[name], ("t", "x", "u"))
+                    self._functions[name] = self._function(rows, directions)
+                loop = Loop(self._functions[name], ("t", "x", "u", *moving))
             setattr(self._own, name, loop)
         return loop
-
-    def _loop(self, directions: int) -> Loop:
-        """The channels asked for and their derivatives along directions, made from the expression graph."""
-        return Loop(self._function(self._all_rows, directions), ("t", "x", "u", "t_way", "x_way", "u_way"))
 
     def _function(
         self, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], directions: int = 0
@@ -330,23 +333,32 @@ class ChannelValues:
 
     def _rows_with_rates(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         values, x = casadi.vertcat(*self._all_rows(inputs)), inputs["x"]
-        half = x.numel() // 2
+        half, coordinates = x.numel() // 2, self._model.manifest.coordinates
         moved = casadi.vertcat(1.0, x[half:], casadi.SX.zeros(half))
+        lags = [half + k for k, one in enumerate(coordinates) if one.kind == "lag"]  # velocities that are angles
+        if lags:
+            rhs = self._model.symbolic("rhs")
+            moved[[1 + k for k in lags]] = rhs.call([inputs[name] for name in rhs.name_in()])[0][lags]
         return [values, casadi.jtimes(values, casadi.vertcat(inputs["t"], x), moved)]
 
     def _more_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         found = []
         for rows in self._more:
             group = self._model.symbolic(rows.function)
-            (every,) = group.call([inputs[name] for name in group.name_in()])
+            every = group.call([inputs[name] for name in group.name_in()])[0]
             found.append(every[rows.indices.tolist()])
         return found
+
+
+def _rows(model: LoadedModel, channel: str) -> list[Rows]:
+    if channel != WINDOWS:
+        return rows_of(model, channel)
+    count = len(model.manifest.edges)
+    labels = tuple(f"{WINDOWS}[{k + 1}]" for k in range(count))
+    return [Rows(function=WINDOWS, indices=np.arange(count), labels=labels, units=("rad",) * count)]
 
 
 def jumps(model: LoadedModel, channel: str) -> bool:
     """Whether a channel jumps at a window's edge, where the angle is a state."""
     windows = {k for k in model.manifest.borders if model.manifest.inputs[k].windows}
-    if not windows or channel in model.states:
-        return False
-    channels = ChannelValues(model, [channel])
-    return bool(windows & set(channels._function(channels._all_rows).jac_sparsity(0, 2).get_col()))
+    return bool(windows) and channel not in model.states and bool(windows & set(depends(model, channel, "u")))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ballpass.runtime.quantity.passages import jumps_at
+from ballpass.runtime.quantity.cuts import jumps_at
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.time.turning import beside
