@@ -20,6 +20,7 @@ from ballpass.runtime.quantity.cuts import moving_cuts
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.nodes import Cause, Cuts
 from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.quantity.track import WINDOWS, ChannelValues
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.run.directions import Chain
@@ -222,3 +223,35 @@ def test_steps_end_where_balls_come_into_contact_and_leave_it(make_model: Callab
         roots = [brentq(CubicSpline(around, place[:, ball]), around[0], around[-1]) for ball in changing]
         assert np.min(np.abs(np.array(roots) - kink)) < 1e-9
     assert len(kinks) >= 4
+
+
+SPALL = """[bearing.cage]
+slip = { time = ["0 s", "0.01 s", "0.03 s"], value = [0.0, 0.2, 0.05] }
+
+[bearing.defects.pit]
+on = "inner"
+angle = "10 deg"
+chord = "0.3 mm"
+profile = "path"
+
+[bearing.initial]"""
+
+
+def test_rates_of_angles_count_the_slip_of_a_cage_that_is_a_state(make_virtual: Callable[..., Model]) -> None:
+    """Of a press that a motor turns: angles that a run is cut at, along straight lines as the motion goes."""
+    outputs = ('outputs = ["inner.*",', 'outputs = ["cage.*", "inner.*",')
+    model, many, step = make_virtual("punching_press_motor", outputs, ("[bearing.initial]", SPALL)), 6, 1e-6
+    random, numbers = np.random.default_rng(5), model.numbers(None)
+    here = {"t": random.uniform(0.0, 0.1, many), "x": 1e-6 * random.normal(size=(many, len(model.states)))}
+    here["x"][:, model.states.index("driver.angle")] = random.uniform(0.0, 6.0, many)
+    here["x"][:, model.states.index("driver.speed")] = 50.0
+    rest = {"u": random.normal(size=(many, len(model.manifest.inputs))), "p": numbers.p, "c": numbers.c}
+    (motion,) = model.loop("rhs", ("t", "x", "u"))(many, {**here, **rest}).values()
+    for channel in (WINDOWS, "cage.in_inner"):
+        channels = ChannelValues(model, [channel])
+        loop = channels._own_loop("rates", channels._rows_with_rates)
+        (_, rate), (ahead, _), (back, _) = (
+            np.split(loop(many, {"t": here["t"] + h, "x": here["x"] + h * motion, **rest})["g"].copy(), 2, axis=1)
+            for h in (0.0, step, -step)
+        )
+        assert rate == pytest.approx((ahead - back) / (2.0 * step), rel=1e-6, abs=1e-6), channel
