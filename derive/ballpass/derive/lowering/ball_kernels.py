@@ -100,6 +100,8 @@ class BallBuilder:
         self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
         self._further: dict[sp.Expr, ca.SX] = {}
         own = bearing.ball.own
+        # what all balls have alike may be named among the definitions of one
+        self._named = of_state.child({}, self._definitions)
         affine = self._affine()
         #: whether slopes are taken one by one
         self.general = affine is None or (own is not None and own.slope is not None)
@@ -128,12 +130,6 @@ class BallBuilder:
     def _motion(at: dict[str, ca.SX]) -> ca.SX:
         """Deflection, its rate, and the weights of the force."""
         return ca.vertcat(at["delta"], at["rate"], at["weights"])
-
-    def _named(self, expression: sp.Expr) -> ca.SX:
-        """What all balls have alike, without names of the definitions of one, which stage variables do not know."""
-        while named := expression.free_symbols & self._definitions.keys():
-            expression = expression.xreplace({symbol: self._definitions[symbol] for symbol in named})
-        return self._of_state(expression)
 
     def _hoist(self, expression: sp.Expr) -> ca.SX:
         """Entry of r behind the cage's direction, for what depends on time or state but not on the ball."""

@@ -113,6 +113,18 @@ class Visitor:
             self._is_constant[expression] = found
         return found
 
+    def _closed(self, expression: sp.Expr) -> sp.Expr:
+        """Without names that only children define: who takes a hoisted expression does not know them."""
+        if self._parent is None:
+            return expression
+        while named := {s for s in expression.free_symbols if s in self._definitions and not self._parent._knows(s)}:
+            expression = expression.xreplace({s: sp.sympify(self._definitions[s]) for s in named})
+        return self._parent._closed(expression)
+
+    def _knows(self, symbol: sp.Symbol) -> bool:
+        here = symbol in self._values or symbol in self._definitions
+        return here or (self._parent is not None and self._parent._knows(symbol))
+
     # lowering
 
     def _lower(self, expression: sp.Basic) -> ca.SX:
@@ -122,11 +134,11 @@ class Visitor:
             if expression in self._definitions:
                 defined = self._definitions[expression]
                 if self._hoist is not None and not _is_trivial(defined) and self._fixed(defined):
-                    return self._hoist(expression)
+                    return self._hoist(self._closed(expression))
                 return self(defined)
             raise TypeError(f"the symbol {expression} has no value here")
         if self._hoist is not None and not _is_trivial(expression) and self._fixed(expression):
-            return self._hoist(expression)
+            return self._hoist(self._closed(expression))
         if isinstance(expression, sp.Add | sp.Mul) and self._hoist is not None:
             expression = self._gather(expression)
         return self._operate(expression)
