@@ -1,6 +1,6 @@
 """Random scenes over the features of the scene file: what is one scene is a pure function of its seed.
 
-In: a seed.  Out: the tables of a scene file, every quantity a text in SI units, so that mutants are plain edits of them.
+In: a seed.  Out: the tables of a scene file, every quantity a text in SI units, so that mutants are plain edits.
 """
 
 from __future__ import annotations
@@ -114,7 +114,9 @@ def bearing(draw: Draw, kind: str) -> Tables:
     if roller:
         contact = {"stiffness": quantity(draw.size(3e8, 1e9), "N/m^(10/9)"), "length": quantity(8e-3, "m")}
     if geometry:
-        contact = {f"{ring}_groove_radius": quantity(draw.number(0.515, 0.53) * ball, "m") for ring in ("inner", "outer")}
+        contact = {
+            f"{ring}_groove_radius": quantity(draw.number(0.515, 0.53) * ball, "m") for ring in ("inner", "outer")
+        }
         contact |= {"young_modulus": draw.of("Pa", 2e11, 2.1e11), "poisson_ratio": draw.number(0.28, 0.31)}
         if draw.chance(0.5):
             contact["ball_material"] = {"young_modulus": "3.1e11 Pa", "poisson_ratio": draw.number(0.25, 0.28)}
@@ -122,7 +124,11 @@ def bearing(draw: Draw, kind: str) -> Tables:
         contact["smoothing"] = draw.of("m", 2e-8, 3e-7)
     out["contact"] = contact
     out["damping"] = _damping(draw)
-    elastic = {"mass": draw.of("kg", 0.2, 1), "stiffness": draw.of("N/m", 2e7, 9e7), "damping": draw.of("N*s/m", 0, 900)}
+    elastic = {
+        "mass": draw.of("kg", 0.2, 1),
+        "stiffness": draw.of("N/m", 2e7, 9e7),
+        "damping": draw.of("N*s/m", 0, 900),
+    }
     out["outer_ring"] = {"support": "elastic", **elastic} if draw.chance(0.4) else {"support": "fixed"}
     if kind in ("shaft", "one-way"):
         out["inner_ring"] = {"mass": draw.of("kg", 0.3, 2)}
@@ -187,7 +193,10 @@ def _effects(draw: Draw, count: int, room: float) -> Tables:
         cage["slip"] = draw.number(-0.02, 0.1)
         if draw.chance(0.5):
             later = draw.rising("s", 0.01, 0.15, draw.whole(1, 2))
-            cage["slip"] = {"time": ["0.0 s", *later], "value": [draw.number(-0.02, 0.2) for _ in range(1 + len(later))]}
+            cage["slip"] = {
+                "time": ["0.0 s", *later],
+                "value": [draw.number(-0.02, 0.2) for _ in range(1 + len(later))],
+            }
             if draw.chance(0.5):
                 cage["slip"]["lag"] = draw.of("rad", -0.3, 0.3)
     return out | ({"cage": cage} if cage else {})
@@ -242,7 +251,9 @@ def _load(draw: Draw, kind: str, speed: float) -> Tables:
 def _crank(draw: Draw) -> Tables:
     """A crank alone whose bearing carries all of it: one-way and two-way are the same machine."""
     mass, pin = draw.of("kg", 0.4, 2), quantity(8e-3, "m")
-    bodies = {"crank": {"mass": mass, "inertia": draw.of("kg*m^2", 1e-4, 1e-3), "center_of_mass": draw.vector("m", 2e-3)}}
+    bodies = {
+        "crank": {"mass": mass, "inertia": draw.of("kg*m^2", 1e-4, 1e-3), "center_of_mass": draw.vector("m", 2e-3)}
+    }
     bodies["crank"]["points"] = {"A": "origin", "B": pin}
     mechanism: Tables = {
         "driver": {"joint": "A", "speed": quantity(draw.number(20, 100) * draw.one([1, -1]), "rad/s")},
@@ -312,7 +323,11 @@ def _machine(draw: Draw, kind: str) -> Tables:
 
 
 def _motor(draw: Draw, speed: float) -> Tables:
-    law, sense, size = draw.one(["constant", "linear", "nominal", "table", "asynchronous", "none"]), np.sign(speed), abs(speed)
+    law, sense, size = (
+        draw.one(["constant", "linear", "nominal", "table", "asynchronous", "none"]),
+        np.sign(speed),
+        abs(speed),
+    )
     torque = quantity(sense * draw.number(5, 50), "N*m")
     if law == "none":
         return {"law": law}
@@ -339,7 +354,11 @@ def _amount_of(draw: Draw, name: str, unit: str, size: float, starts: Sequence[f
     if draw.chance(0.3):
         turns = draw.one([1, 1, 2])
         rows = draw.rising("rad", starts[0] - 1, starts[0] + 4 * turns, 4 * turns)
-        table = {"angle": rows, name: [draw.of(unit, -size, size) for _ in rows], **({"turns": turns} if turns > 1 else {})}
+        table = {
+            "angle": rows,
+            name: [draw.of(unit, -size, size) for _ in rows],
+            **({"turns": turns} if turns > 1 else {}),
+        }
         return {"table": table} | ({"direction": draw.of("rad", -3, 3)} if name == "force" else {})
     if draw.chance(0.5):
         windows = []

@@ -15,6 +15,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,7 @@ class Bearing:
         """Behind a cage with the last slip; `turned` gives the angles of both rings at a time."""
         times = [number(row) for row in self.slips["time"]]
         edges, total = [*(row for row in times if row < time), time], number(self.slips.get("lag", 0.0))
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in pairwise(edges):
             lost = self.last - self.weights(self.slip(0.5 * (begin + end)))
             total += float(lost @ (np.array(turned(end)) - np.array(turned(begin))))
         return total
@@ -273,9 +274,7 @@ class Reference:
         assert not missing(scene)
         self.scene, self.mechanism = scene, scene.get("mechanism")
         tables = {"": scene["bearing"]} if "bearing" in scene else scene.get("bearings", {})
-        self.bearings = [
-            Bearing(f"{name}." if name else "", data, self._stands(data)) for name, data in tables.items()
-        ]
+        self.bearings = [Bearing(f"{name}." if name else "", data, self._stands(data)) for name, data in tables.items()]
         self.two_way = any(one.data.get("coupling") == "two-way" for one in self.bearings)
         if self.mechanism is None:
             return
@@ -293,15 +292,23 @@ class Reference:
         for one in self.bearings if self.two_way else ():
             self.at_joint.setdefault(one.data["joint"], []).append(one)
         self.first_pose = self._assembled()
+        self._poses = [(self.start, self.first_pose)]  # of the ideal linkage, known so far
         self._means: dict[tuple[str, str], float | None] = {}
 
     def _stands(self, data: Tables) -> bool:
         if "shaft" in self.scene:
             return self.scene["shaft"].get("ring", "inner") == "outer"
-        return bool(data.get("coupling") == "two-way" and self._rings_of(data)[0] == "frame")
+        if data.get("coupling") != "two-way":
+            return False
+        standing, joints = {"frame"}, self.scene["mechanism"]["joints"].values()
+        for _ in joints:  # what slides on a body that stands does not turn
+            standing |= {
+                b for j in joints if j["type"] == "prismatic" and standing & {*j["bodies"]} for b in j["bodies"]
+            }
+        return self._rings_of(data)[0] in standing
 
     def _rings_of(self, data: Tables) -> tuple[str, str]:
-        """Bodies that carry the inner and the outer ring: where one of both is the frame, the inner ring may be unsaid."""
+        """Bodies that carry the inner and the outer ring; the inner one is the moving body where nothing is said."""
         first, second = self.scene["mechanism"]["joints"][data["joint"]]["bodies"]
         inner = data.get("inner_ring", {}).get("body", second if first == "frame" else first)
         return inner, first if inner == second else second
@@ -377,7 +384,7 @@ class Reference:
         """Distances that coordinates of bearings measure, by their names."""
         for several in self.at_joint.values():
             for k, one in enumerate(several):
-                inner, outer = self._rings_of(one.data)
+                inner, _ = self._rings_of(one.data)
                 sign = 1.0 if self.joints[one.data["joint"]]["bodies"][1] == inner else -1.0
                 if k == 0:
                     apart, jacobian, left = self.line(one.data["joint"], q, v)
@@ -393,7 +400,10 @@ class Reference:
         still, worst = np.zeros(self.size), math.inf
         for _ in range(50):
             residual, rows, *_ = self.constraints(q, still, False)
-            parts, slopes = [residual, [self.row(self.driven) @ q - angle]], [rows.reshape(-1, self.size), self.row(self.driven)[None]]
+            parts, slopes = (
+                [residual, [self.row(self.driven) @ q - angle]],
+                [rows.reshape(-1, self.size), self.row(self.driven)[None]],
+            )
             for name, (apart, jacobian, _) in self._play(q, still):
                 parts.append(apart - [state.get(f"{name}.{axis}", 0.0) for axis in "xy"])
                 slopes.append(jacobian)
@@ -422,15 +432,17 @@ class Reference:
         raise AssertionError("no pose on the branches of the scene was found")
 
     def _beyond(self, entry: Tables, size: float, free: float) -> float:
-        """An angle between bodies beyond the free one: within half a turn of it where they turn against each other, else
-        without a jump, its mean over a turn of the driver within half a turn of the free angle."""
+        """Beyond a free size; an angle within half a turn of the free one where the bodies turn against each other.
+
+        Else it has no jump, and its mean over a turn of the driver is within half a turn of the free angle.
+        """
         if "points" in entry:
             return size - free
         first, second = entry["bodies"]
         if (first, second) not in self._means:
-            q, found = self.first_pose, []
-            for k in range(361):
-                q, _ = self.closed(self.start + math.radians(k), q, {})
+            found = []
+            for k in range(61):
+                q = self.pose(self.start + math.radians(6 * k), {})
                 found.append(self.angle(second, q) - self.angle(first, q))
             self._means[first, second] = float(np.mean(found[:-1])) if abs(found[-1] - found[0]) < 1.0 else None
         mean = self._means[first, second]
@@ -444,7 +456,9 @@ class Reference:
         while waiting:
             for name in waiting:
                 pair = self.joints[name]["bodies"]
-                outer = [[n for n, j in self.joints.items() if b in j["bodies"] and placed & {*j["bodies"]}] for b in pair]
+                outer = [
+                    [n for n, j in self.joints.items() if b in j["bodies"] and placed & {*j["bodies"]}] for b in pair
+                ]
                 if all(outer) and not placed & {*pair}:
                     break
             else:
@@ -467,7 +481,7 @@ class Reference:
 
     def pose(self, angle: float, state: Mapping[str, float]) -> Array:
         """Of the displaced linkage, followed from the start so that angles keep their turns."""
-        q, at, step_ = self.first_pose, self.start, 0.1
+        (at, q), step_ = min(self._poses, key=lambda known: abs(known[0] - angle)), 0.1
         while at != angle:
             there = angle if abs(angle - at) <= step_ else at + math.copysign(step_, angle - at)
             moved, _ = self.closed(there, q, {})
@@ -475,6 +489,7 @@ class Reference:
                 step_ /= 4
                 continue
             q, at, step_ = moved, there, 0.1
+            self._poses.append((at, q))
         q, worst = self.closed(angle, q, state)
         assert worst < 1e-12
         return q
@@ -572,7 +587,9 @@ class Reference:
                 free = number(entry.get("free_length", entry.get("free_angle", 0.0)))
                 beyond = self._beyond(entry, size, free)
                 pull = number(entry.get("preload", 0.0)) + number(entry.get("damping", 0.0)) * float(gradient @ v)
-                pull += number(entry.get("stiffness", 0.0)) * beyond + number(entry.get("cubic_stiffness", 0.0)) * beyond**3
+                pull += (
+                    number(entry.get("stiffness", 0.0)) * beyond + number(entry.get("cubic_stiffness", 0.0)) * beyond**3
+                )
                 total -= pull * gradient
                 outputs[f"{key}.{name}.{'tension' if 'points' in entry else 'torque'}"] = pull
                 if "points" in entry:
@@ -679,7 +696,11 @@ class Reference:
         near = self.driver["joint"]
         far = next(n for n, j in self.joints.items() if n != near and self.driven in j["bodies"])
         here, there = (
-            vector(crank["points"][dict(zip(self.joints[n]["bodies"], self.joints[n].get("points", (n, n)), strict=True))[self.driven]])
+            vector(
+                crank["points"][
+                    dict(zip(self.joints[n]["bodies"], self.joints[n].get("points", (n, n)), strict=True))[self.driven]
+                ]
+            )
             for n in (near, far)
         )
         arm = there - here

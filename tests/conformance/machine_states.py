@@ -1,0 +1,151 @@
+"""A random scene's machine at random states: by its model, by `reference.py`, and as a mutant of it.
+
+In: the tables of a scene.  Out: values by name, and how far those of two routes are apart.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from generator import Tables, amount, text
+from mutants import Mutant
+from reference import Reference
+from virtual import virtual_model
+
+from ballpass.runtime import Model
+from ballpass.runtime.point.evaluate import point
+
+Values = dict[str, Any]
+
+#: Greatest difference, relative to the largest value of a unit.
+TOLERANCE = 1e-9
+#: Of its digits a torque or moment that is zero has none.
+NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class States:
+    """A machine by the functions of its model, evaluated by CasADi's virtual machine."""
+
+    tables: Tables
+
+    @cached_property
+    def model(self) -> Model:
+        return virtual_model(text(self.tables), Path(self._folder.name) / "machine")
+
+    @cached_property
+    def _folder(self) -> tempfile.TemporaryDirectory[str]:
+        """As long as the machine lives: functions are read when they are first called."""
+        return tempfile.TemporaryDirectory()
+
+    def drawn(self, rng: np.random.Generator) -> tuple[float, Values]:
+        """A time of the first turns, and a state in which some balls are loaded."""
+        driver = self.tables.get("shaft") or self.tables["mechanism"]["driver"]
+        speed = driver["speed"] if "speed" in driver else driver["table"]["speed"][0]
+        start = amount(driver.get("start_angle", 0.0))
+        return float(rng.uniform(0, 2)) * math.tau / abs(amount(speed)), {
+            name: float(self._drawn(rng, name, start)) for name in self.model.states
+        }
+
+    @staticmethod
+    def _drawn(rng: np.random.Generator, name: str, start: float) -> float:
+        if name == "driver.angle":
+            return start + rng.uniform(-8, 8)
+        if name == "driver.speed":
+            return rng.uniform(-60, 60)
+        if "cage.lag" in name:
+            return 0.0 if name.endswith("integral") else rng.uniform(-0.5, 0.5)
+        return rng.uniform(-0.1, 0.1) if re.search(r"v.$", name) else rng.uniform(-3e-5, 3e-5)
+
+    def at(self, time: float, state: Mapping[str, float]) -> tuple[Values, Values]:
+        """Outputs, and rates of velocities by their names."""
+        model = self.model
+        x = np.array([state[name] for name in model.states])
+        outputs = dict(model.evaluate(time, x))
+        half, rates = len(x) // 2, {}
+        if half:
+            found = np.ravel(model.kernel("rhs")(point(model, model.numbers(), time, x)))
+            rates = dict(zip(model.states[half:], map(float, found[half:]), strict=True))
+        return outputs, rates
+
+    def unit(self, name: str) -> str:
+        """Of an output or, per second, of a state."""
+        known = {one.name: one.unit for one in self.model.manifest.outputs}
+        known |= {one.name: one.unit for one in self.model.manifest.states}
+        return known[name]
+
+
+def by_reference(reference: Reference, time: float, state: Values) -> tuple[Values, Values]:
+    """Outputs, and rates of velocities by their names."""
+    found = reference.evaluate(time, state)
+    rates = {name.removeprefix("a."): value for name, value in found.items() if name.startswith("a.")}
+    outputs = {name: value for name, value in found.items() if not name.startswith("a.")}
+
+    def velocity(name: str) -> str:
+        if name.endswith("lag_integral"):
+            return name.removesuffix("_integral")
+        return "driver.speed" if name == "driver.angle" else re.sub(r"(.)$", r"v\1", name)
+
+    return outputs, {velocity(name): value for name, value in rates.items()}
+
+
+def differences(first: Values, second: Values, units: Mapping[str, str], label: str = "") -> dict[str, float]:
+    """Names of values that differ, and by which part of the largest value of their unit."""
+    sizes: dict[str, float] = {}
+    for name in first:
+        sizes[units[name]] = max(sizes.get(units[name], NOTHING), float(np.max(np.abs(first[name]))))
+    lever = 1e-3 * sizes.get("N", 0.0)  # torques that cancel
+    sizes |= {unit: max(size, lever) for unit, size in sizes.items() if unit in ("N*m", "W")}
+    found = {}
+    for name, value in first.items():
+        apart = np.abs(np.asarray(value) - second[name])
+        if units[name] == "rad":
+            apart, size = np.abs(np.angle(np.exp(1j * (np.asarray(value) - second[name])))), 1.0
+        else:
+            size = sizes[units[name]]
+        if not float(np.max(apart)) <= TOLERANCE * size:
+            found[label + name] = float(np.max(apart)) / size
+    return found
+
+
+def against_reference(machine: States, reference: Reference, time: float, state: Values) -> dict[str, float]:
+    """Where a machine's model is not the reference."""
+    found = {}
+    for one, other, label in zip(
+        machine.at(time, state), by_reference(reference, time, state), ("", "rate of "), strict=True
+    ):
+        both = {name: value for name, value in one.items() if name in other}
+        missed = [name for name in one if name not in both and (label or re.search(r"^reaction|ball\.force", name))]
+        assert not missed, missed
+        found |= differences(both, other, {name: machine.unit(name) for name in both}, label)
+    return found
+
+
+def against_mutant(machine: States, mutant: Mutant, twin: States, time: float, state: Values) -> dict[str, float]:
+    """Where a mutant's model has another answer."""
+    later, found = time * mutant.time, {}
+    other = mutant.moved(state)
+    other |= mutant.further(later, other)
+    other = {name: value * mutant.scale(twin.unit(name)) for name, value in other.items() if name in twin.model.states}
+    rng = np.random.default_rng(1)
+    other |= {name: States._drawn(rng, name, 0.0) for name in twin.model.states if name not in other}
+    for one, two, label in zip(machine.at(time, state), twin.at(later, other), ("", "rate of "), strict=True):
+        expected = {n: v for n, v in mutant.moved(one).items() if not n.startswith(mutant.but or ("-",))}
+        units = {name: twin.unit(name) for name in expected}
+        per = 1.0 / mutant.time if label else 1.0
+        expected = {name: value * mutant.scale(units[name]) * per for name, value in expected.items()}
+        found |= differences(expected, two, units, label)
+    return found
+
+
+def states_of(machine: States, seed: int, count: int = 2) -> list[tuple[float, Values]]:
+    rng = np.random.default_rng([seed, 7])
+    return [machine.drawn(rng) for _ in range(count)]

@@ -1,0 +1,65 @@
+"""Random scenes over the features of the scene file: every route has one answer, and so has every mutant of a machine.
+
+BALLPASS_SCENES says how many seeds the long tests take; `scripts/validation/machines.py` counts scenes and mismatches.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluators import Evaluators
+from generator import scene, text
+from machine_states import States, against_mutant, against_reference, states_of
+from mutants import MUTANTS, mutant
+from reference import Reference
+
+from ballpass.derive.reading.read import scene_from_text
+
+COUNT = int(os.environ.get("BALLPASS_SCENES", 48))
+#: Of each kind of machine one; 25 and 56 could not be derived once.
+QUICK = (0, 4, 5, 25, 56, 7)
+
+
+def seeds(quick: tuple[int, ...], every: int = 1) -> list[Any]:
+    long = [seed for seed in range(0, COUNT, every) if seed not in quick]
+    return [*quick, *(pytest.param(seed, marks=pytest.mark.long) for seed in long)]
+
+
+@pytest.mark.parametrize("seed", seeds(QUICK))
+def test_random_scenes_move_as_in_maximal_coordinates(seed: int) -> None:
+    """Accelerations, reactions, torques, ball forces and rates of lags."""
+    tables = scene(seed)
+    machine, reference = States(tables), Reference(tables)
+    for state in states_of(machine, seed):
+        assert not against_reference(machine, reference, *state)
+
+
+#: A seed for each mutant that has something to edit.
+PAIRS = {name: next(s for s in range(60) if s not in (1, 2) and mutant(name, scene(s)) is not None) for name in MUTANTS}
+
+
+@pytest.mark.parametrize("name", ["frame mirrored", *(pytest.param(n, marks=pytest.mark.long) for n in MUTANTS)])
+def test_mutants_of_random_scenes_are_the_same_machine(name: str) -> None:
+    tables, found = scene(PAIRS[name]), mutant(name, scene(PAIRS[name]))
+    machine = States(tables)
+    assert found is not None
+    twin = States(found.tables)
+    for state in states_of(machine, PAIRS[name]):
+        assert not against_mutant(machine, found, twin, *state)
+
+
+@pytest.mark.parametrize("seed", seeds((5,), every=6))
+def test_evaluators_of_random_scenes_agree(seed: int, tmp_path: Path) -> None:
+    """SymPy in 40 digits, CasADi's virtual machine, compiled kernels."""
+    evaluators = Evaluators(scene_from_text(text(scene(seed)), "machine"), tmp_path)
+    for at in evaluators.points(2) if evaluators.system.coordinates else ():
+        exact, virtual = evaluators.by_sympy(at), evaluators.value("rhs", at).ravel()
+        half = len(exact) // 2
+        scale = np.max(np.abs(exact[half:]))
+        assert virtual[half:] == pytest.approx(exact[half:], rel=1e-9, abs=1e-9 * scale)
+        if evaluators.functions.kernels is not None:
+            assert evaluators.stages(at, 1e-4)[0][half:] == pytest.approx(exact[half:], rel=1e-9, abs=1e-9 * scale)
