@@ -11,7 +11,6 @@ import sys
 import warnings
 from collections.abc import Iterator
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from scripts.validation.lines import HERE
@@ -55,9 +54,9 @@ def rows() -> dict[tuple[int, str], int]:
         return {(int(row["seed"]), row["case"]): int(row["differing"]) for row in csv.DictReader(file)}
 
 
-def write(found: dict[tuple[int, str], int], path: Path = ROWS) -> None:
+def write(found: dict[tuple[int, str], int]) -> None:
     """Rows in the order of seeds."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with ROWS.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["seed", "case", "differing"])
         writer.writerows((*key, found[key]) for key in sorted(found, key=lambda key: key[0]))

@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import math
 import re
-import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from generator import Tables, amount, text
 from mutants import Mutant
 from reference import Reference
-from virtual import virtual_model
 
-from ballpass.runtime import Model
-from ballpass.runtime.point.evaluate import point
+from ballpass.derive import derive
+from ballpass.derive.emit.describe import describe
+from ballpass.derive.emit.generate import signature
+from ballpass.derive.lowering.functions import LoweredFunctions, lower
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.parameters import numbers_of
+from ballpass.runtime.time import timeline
 
 Values = dict[str, Any]
 
@@ -31,20 +32,24 @@ TOLERANCE = 1e-9
 NOTHING = 1e-12
 
 
-@dataclass(frozen=True)
+#: What was derived, by the signature of its structure: numbers are parameters, and derive nothing anew.
+_DERIVED: dict[str, tuple[LoweredFunctions, Manifest]] = {}
+
+
 class States:
-    """A machine by the functions of its model, evaluated by CasADi's virtual machine."""
+    """A machine by its functions, as CasADi's virtual machine evaluates them at the times of the runtime's timeline."""
 
-    tables: Tables
-
-    @cached_property
-    def model(self) -> Model:
-        return virtual_model(text(self.tables), Path(self._folder.name) / "machine")
-
-    @cached_property
-    def _folder(self) -> tempfile.TemporaryDirectory[str]:
-        """As long as the machine lives: functions are read when they are first called."""
-        return tempfile.TemporaryDirectory()
+    def __init__(self, tables: Tables) -> None:
+        self.tables, scene = tables, scene_from_text(text(tables), "machine")
+        key = signature(scene)
+        if key not in _DERIVED:
+            system = derive(scene)
+            functions = lower(system, derivatives=False)
+            _DERIVED[key] = functions, describe(system, functions, "", ())
+        self.functions, self.manifest = _DERIVED[key]
+        values = {one.path: one.value for one in scene.quantities}
+        self.numbers = numbers_of(self.manifest, values, lambda p: np.array(self.functions["constants"](p)).ravel())
+        self.states = [one.name for one in self.manifest.states]
 
     def drawn(self, rng: np.random.Generator) -> tuple[float, Values]:
         """A time of the first turns, and a state in which some balls are loaded."""
@@ -52,7 +57,7 @@ class States:
         speed = driver["speed"] if "speed" in driver else driver["table"]["speed"][0]
         start = amount(driver.get("start_angle", 0.0))
         return float(rng.uniform(0, 2)) * math.tau / abs(amount(speed)), {
-            name: float(self._drawn(rng, name, start)) for name in self.model.states
+            name: float(self._drawn(rng, name, start)) for name in self.states
         }
 
     @staticmethod
@@ -67,19 +72,27 @@ class States:
 
     def at(self, time: float, state: Mapping[str, float]) -> tuple[Values, Values]:
         """Outputs, and rates of velocities by their names."""
-        model = self.model
-        x = np.array([state[name] for name in model.states])
-        outputs = dict(model.evaluate(time, x))
-        half, rates = len(x) // 2, {}
-        if half:
-            found = np.ravel(model.kernel("rhs")(point(model, model.numbers(), time, x)))
-            rates = dict(zip(model.states[half:], map(float, found[half:]), strict=True))
-        return outputs, rates
+        x, numbers = np.array([state[name] for name in self.states]), self.numbers
+        inputs = timeline.inputs_at(self.manifest, numbers.values, time)
+        given = {"t": 0.0, "x": x, "u": inputs, "p": numbers.p, "c": numbers.c}
+
+        def call(name: str) -> list[Any]:
+            function = self.functions[name]
+            found = function.call([given[one] for one in function.name_in()])
+            return [np.array(one).ravel() for one in found]
+
+        outputs = {
+            one.name: value if one.size > 1 else float(value[0])
+            for one, value in zip(self.manifest.outputs, call("outputs"), strict=True)
+        }
+        half = len(x) // 2
+        found = call("rhs")[0][half:] if half else []
+        return outputs, dict(zip(self.states[half:], map(float, found), strict=True))
 
     def unit(self, name: str) -> str:
         """Of an output or, per second, of a state."""
-        known = {one.name: one.unit for one in self.model.manifest.outputs}
-        known |= {one.name: one.unit for one in self.model.manifest.states}
+        known = {one.name: one.unit for one in self.manifest.outputs}
+        known |= {one.name: one.unit for one in self.manifest.states}
         return known[name]
 
 
@@ -134,9 +147,9 @@ def against_mutant(machine: States, mutant: Mutant, twin: States, time: float, s
     later, found = time * mutant.time, {}
     other = mutant.moved(state)
     other |= mutant.further(later, other)
-    other = {name: value * mutant.scale(twin.unit(name)) for name, value in other.items() if name in twin.model.states}
+    other = {name: value * mutant.scale(twin.unit(name)) for name, value in other.items() if name in twin.states}
     rng = np.random.default_rng(1)
-    other |= {name: States._drawn(rng, name, 0.0) for name in twin.model.states if name not in other}
+    other |= {name: States._drawn(rng, name, 0.0) for name in twin.states if name not in other}
     for one, two, label in zip(machine.at(time, state), twin.at(later, other), ("", "rate of "), strict=True):
         expected = {n: v for n, v in mutant.moved(one).items() if not n.startswith(mutant.but or ("-",))}
         units = {name: twin.unit(name) for name in expected}

@@ -5,23 +5,29 @@ BALLPASS_SCENES says how many seeds the long tests take; `scripts/validation/mac
 
 from __future__ import annotations
 
+import io
 import os
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from evaluators import Evaluators
-from generator import scene, text
+from generator import KINDS, scene, text
 from machine_states import States, against_mutant, against_reference, states_of
 from mutants import MUTANTS, mutant
+from quick_cases import long_but
 from reference import Reference
 
 from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model
+from ballpass.runtime.export.c_program import export_c
 
 COUNT = int(os.environ.get("BALLPASS_SCENES", 48))
 #: Of each kind of machine one; 25 and 56 could not be derived once.
-QUICK = (0, 4, 5, 25, 56, 7)
+QUICK = (0, 4, 5, 25, 56, 15)
 
 
 def seeds(quick: tuple[int, ...], every: int = 1) -> list[Any]:
@@ -42,7 +48,7 @@ def test_random_scenes_move_as_in_maximal_coordinates(seed: int) -> None:
 PAIRS = {name: next(s for s in range(60) if s not in (1, 2) and mutant(name, scene(s)) is not None) for name in MUTANTS}
 
 
-@pytest.mark.parametrize("name", ["frame mirrored", *(pytest.param(n, marks=pytest.mark.long) for n in MUTANTS)])
+@pytest.mark.parametrize("name", long_but(MUTANTS, "frame mirrored"))
 def test_mutants_of_random_scenes_are_the_same_machine(name: str) -> None:
     tables, found = scene(PAIRS[name]), mutant(name, scene(PAIRS[name]))
     machine = States(tables)
@@ -63,3 +69,29 @@ def test_evaluators_of_random_scenes_agree(seed: int, tmp_path: Path) -> None:
         assert virtual[half:] == pytest.approx(exact[half:], rel=1e-9, abs=1e-9 * scale)
         if evaluators.functions.kernels is not None:
             assert evaluators.stages(at, 1e-4)[0][half:] == pytest.approx(exact[half:], rel=1e-9, abs=1e-9 * scale)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(6, 6 + len(KINDS)))
+def test_runs_of_random_scenes_agree(seed: int, model_of: Callable[..., Model], tmp_path: Path) -> None:
+    """The stepper alone, in lanes, in an exported program, and CasADi's integrator."""
+    model = model_of(text(scene(seed)))
+    run: dict[str, Any] = {"cycles": 0.1, "transient": 0}
+    single = model.simulate(**run, method="stepper", rtol=1e-9)
+    other = model.simulate(**run, method="cvodes", rtol=1e-9)
+    for name in (*single.states, *single.outputs):
+        apart = np.abs(single[name] - other[name])
+        apart = np.minimum(apart, np.abs(apart - 2 * np.pi)) if "angle" in name or "cage.in" in name else apart
+        assert np.median(apart) <= 1e-5 * np.max(np.abs(single[name])) + 1e-12, name
+    if model.states:
+        names = [f"end:{name}" for name in model.states]
+        several = [{}, {}, {}]
+        members = model.simulate_many(several, names, **run, kinks="stepped-over", lanes=False)
+        lanes = model.simulate_many(several, names, **run, kinks="stepped-over")  # or one by one, past edges of spalls
+        assert all(np.array_equal(members[name], lanes[name]) for name in names)
+    folder = export_c(model.folder, tmp_path / "c")
+    subprocess.run(["make", "-s", "-C", str(folder)], check=True, timeout=300)
+    arguments = [str(folder / "scene"), "--cycles", "0.1", "--rtol", "1e-9"]
+    printed = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=300).stdout
+    columns = np.loadtxt(io.StringIO(printed), delimiter=",", skiprows=1, ndmin=2)
+    assert np.array_equal(columns[:, 1 : 1 + len(model.states)], single.x)
