@@ -27,7 +27,7 @@ from ballpass.runtime.export.c_program import export_c
 
 COUNT = int(os.environ.get("BALLPASS_SCENES", 48))
 #: Of each kind of machine one; 25 and 56 could not be derived once.
-QUICK = (0, 4, 5, 25, 56, 15)
+QUICK = (0, 4, 5, 25, 56)
 
 
 def seeds(quick: tuple[int, ...], every: int = 1) -> list[Any]:

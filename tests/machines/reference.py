@@ -756,6 +756,8 @@ class Reference:
             out |= self._named(f"a.{name}", jacobian @ accelerations + left)
         if motor:
             out["a.driver.angle"] = float(self.row(self.driven) @ accelerations)
+        elif "table" in self.driver and not self.bearings:  # integrated along
+            out["a.driver.angle"] = gained
         return out | {f"body.{name}.angle": self.angle(name, q) for name in self.bodies}
 
     def _solved(self, masses: Array, rows: Array, pushed: Array, rest: Array) -> tuple[Array, Array]:
