@@ -85,7 +85,8 @@ def test_runs_of_random_scenes_agree(seed: int, model_of: Callable[..., Model], 
         assert np.median(apart) <= 1e-5 * np.max(np.abs(single[name])) + 1e-12, name
     if model.states:
         names = [f"end:{name}" for name in model.states]
-        several = [{}, {}, {}]
+        name, value = next(iter(model.parameters.items()))
+        several = {name: [value] * 3}
         members = model.simulate_many(several, names, **run, kinks="stepped-over", lanes=False)
         lanes = model.simulate_many(several, names, **run, kinks="stepped-over")  # or one by one, past edges of spalls
         assert all(np.array_equal(members[name], lanes[name]) for name in names)
