@@ -164,6 +164,9 @@ NAMED: dict[str, dict[str, str]] = {
         "all within 3 %": "9.74/9.47 - 1",
         "between 200 and 300 N s/m": "the table",
     },
+    "docs/validation/machines.md": {
+        "agree within 1e-9 of": "`TOLERANCE` of tests/conformance/machine_states.py",
+    },
     "docs/validation/motions.md": {
         "tolerance of 1e-12 and": "`write` of scripts/validation/motions.py; test_driven_crank.py",
         "20 kg, 196 N, no clearance": "the scene",
@@ -337,9 +340,9 @@ NAMED: dict[str, dict[str, str]] = {
         "by more than 0.1 %": "report/digits.py",
         "up to 64 steady turns or 100 000 steps": "settle.py",
         "from 64 on": "settle.py",
-        "At 4096 turns": "settle.py",
+        "At 4096 turns": "repetition.py",
         "from 64 steady ones on": "settle.py",
-        "where 4096 are": "settle.py",
+        "where 4096 are": "repetition.py",
     },
     "docs/reference/outputs.md": {
         "additional turns: 100, or up to 400": "characteristic.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -189,3 +190,40 @@ def test_wear_of_an_even_load_is_that_of_a_pass_times_the_passes(press: Model) -
     np.testing.assert_allclose(field.rate[:, 0], expected, rtol=3e-3)
     assert field.across[-1] == pytest.approx(ring.semi_axes(load)[0])
     np.testing.assert_array_equal(field.rate[:, -1], 0.0)
+
+
+THREE_LOADS = """
+[shaft]
+speed = "600 rpm"
+[load]
+type = "constant"
+force = ["0 lbf", "-650 lbf"]
+[bearing]
+designation = "6308"
+dynamic_rating = "7700 lbf"
+damping = { law = "tangent", ratio = "2e-5 s" }
+inner_ring = { mass = "5 kg", damping = "3000 N*s/m" }
+outer_ring = { support = "fixed" }
+[duty.half_an_hour]
+share = 0.5
+[duty.ten_minutes]
+share = 0.16666666666666667
+set.load.force.y = "-750 lbf"
+[duty.twenty_minutes]
+share = 0.33333333333333333
+set.load.force.y = "-250 lbf"
+"""
+
+
+def test_a_duty_cycle_has_the_mean_load_and_basic_life_of_a_textbook(model_of: Callable[..., Model]) -> None:
+    """650, 750 and 250 lbf for 30, 10 and 20 minutes of an hour: 597.05 lbf, and (7700/597.05)^3 million turns."""
+    report = model_of(THREE_LOADS, "three_loads").life(cycles=60, transient=40, reliability=0.95)
+    (found,) = report.duty
+    pound = 4.4482216152605
+    assert found.mean_load == pytest.approx(597.053 * pound, rel=1e-4)
+    assert found.basic_turns == pytest.approx(2145.03e6, rel=3e-4)
+    assert found.basic_hours == pytest.approx(59584.0, rel=3e-4)
+    (row,) = re.findall(r"basic L_5, mean load P_m \d+ N +(\d+) +(\d+)", str(report))
+    assert [float(cell) for cell in row] == pytest.approx([0.64 * 2145.03, 0.64 * 59584.0], rel=1e-3)  # a_1 of ISO 281
+    with pytest.raises(RequestError, match=r"0\.92"):
+        model_of(THREE_LOADS, "three_loads").life(cycles=60, transient=40, reliability=0.92)

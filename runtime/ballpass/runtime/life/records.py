@@ -157,6 +157,7 @@ class DutyLife(ShortRepr):
     name : of the bearing
     hours, turns : its life; None where there is none
     modified_hours, modified_turns : of L_nmr; None where a state has none
+    mean_load, basic_hours, basic_turns : P_m that has the same L_10 as the loads P of the states [N], and that life
     damage : share of each state [1]
     why_no_life : reason why there is none; empty where there is one
 
@@ -176,5 +177,8 @@ class DutyLife(ShortRepr):
     turns: float | None
     modified_hours: float | None
     modified_turns: float | None
+    mean_load: float | None
+    basic_hours: float | None
+    basic_turns: float | None
     damage: Mapping[str, float]
     why_no_life: str

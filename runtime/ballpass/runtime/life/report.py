@@ -22,6 +22,7 @@ from ballpass.runtime.life.wear import LoadSamples, load_samples, wear_field
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.ratings import life
+from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.lubrication import contamination_of_class, contamination_of_code, viscosity
 from ballpass.runtime.ratings.of_bearing import (
     RacewayContact,
@@ -41,8 +42,14 @@ from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 
 
-def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Request) -> LifeReport:
+def life_report(
+    model: LoadedModel, parameters: Mapping[str, float], request: Request, reliability: float
+) -> LifeReport:
     """Run the scene, in every state of its duty cycle, and judge its bearings.
+
+    Parameters
+    ----------
+    reliability : share of bearings that lives of the text are reached by, one of `RELIABILITY` [1]
 
     Raises
     ------
@@ -59,6 +66,7 @@ def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Re
         title=manifest.title,
         states=tuple(judged),
         duty=tuple(_over_duty(info, judged) for info in manifest.bearings) if manifest.duty else (),
+        reliability=reliability,
     )
 
 
@@ -271,7 +279,16 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
     if not lasting:
         why = turning[0][1].why_no_life if turning else "Nothing turns in any state."
         return DutyLife(
-            name=info.name, hours=None, turns=None, modified_hours=None, modified_turns=None, damage={}, why_no_life=why
+            name=info.name,
+            hours=None,
+            turns=None,
+            modified_hours=None,
+            modified_turns=None,
+            mean_load=None,
+            basic_hours=None,
+            basic_turns=None,
+            damage={},
+            why_no_life=why,
         )
     shares = [state.share for state, _ in lasting]
 
@@ -285,6 +302,8 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
 
     lives = [bearing.life for _, bearing in lasting if bearing.life is not None]
     spent, turns = together(lives)
+    basic = together([bearing.basic_life for _, bearing in lasting if bearing.basic_life is not None])
+    first = lasting[0][1]
     films = [bearing.modified_life for _, bearing in lasting]
     modified = None if None in films else together([each for each in films if each is not None])
     damage = {state.name: 0.0 for state in states}
@@ -296,6 +315,9 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         turns=turns,
         modified_hours=None if modified is None else modified[0],
         modified_turns=None if modified is None else modified[1],
+        mean_load=float(life.equivalent_load(first.dynamic_rating, basic[1], RATED[first.element].life)),
+        basic_hours=basic[0],
+        basic_turns=basic[1],
         damage=damage,
         why_no_life="",
     )

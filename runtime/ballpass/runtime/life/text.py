@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from ballpass.runtime.life.records import BearingStrength, DutyLife, RingStrength, StateStrength
 from ballpass.runtime.ratings.elements import RATED
-from ballpass.runtime.ratings.life import MILLION
+from ballpass.runtime.ratings.life import MILLION, RELIABILITY
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable, Words
@@ -26,6 +26,7 @@ class LifeReport(Reported):
     scene, title : of the model
     states : of the duty cycle, one for a scene without
     duty : life of each bearing over the cycle; empty for a scene without
+    reliability : share of bearings that reach the lives of the text; all others are those of 90 % [1]
 
     Examples
     --------
@@ -38,6 +39,7 @@ class LifeReport(Reported):
     title: str
     states: tuple[StateStrength, ...]
     duty: tuple[DutyLife, ...]
+    reliability: float = 0.9
 
     @property
     def bearings(self) -> tuple[BearingStrength, ...]:
@@ -83,8 +85,8 @@ class LifeReport(Reported):
         swinging = [bearing.why_no_life for state in self.states for bearing in state.bearings if bearing.why_no_life]
         return Report(
             title=f"{self.title}: strength and life of its bearings",
-            parts=[*(part for state in self.states for part in _state_parts(state))]
-            + [part for life in self.duty for part in _duty_parts(life)]
+            parts=[*(part for state in self.states for part in _state_parts(state, self.reliability))]
+            + [part for life in self.duty for part in _duty_parts(life, self.reliability)]
             + self._meanings(),
             facts=facts,
             records=records,
@@ -96,8 +98,8 @@ class LifeReport(Reported):
         """What the lives are."""
         if not self.has_lives:
             return []
-        lives = "  Lives: what 90 % of such bearings reach. basic: from P alone (ISO 281); reference: from the load of "
-        lives += "every ball or roller at every place of both raceways (ISO 16281)"
+        lives = f"  Lives: what {_percent(self.reliability)} of such bearings reach. basic: from P alone (ISO 281); "
+        lives += "reference: from the load of every ball or roller at every place of both raceways (ISO 16281)"
         if any(bearing.factor is not None for state in self.states for bearing in state.bearings):
             lives += "; modified: with a factor a_ISO for oil film (viscosity ratio κ) and dirt (contamination e_C)"
         return [f"{lives}."]
@@ -122,7 +124,7 @@ def _turns_words(state: StateStrength) -> str:
     return f"{run}, not settled: the second half moved a life or a peak by {rounded(100.0 * state.change, 2)} %."
 
 
-def _state_parts(state: StateStrength) -> _Parts:
+def _state_parts(state: StateStrength, reliability: float) -> _Parts:
     parts: _Parts = []
     if state.name:
         parts += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
@@ -131,12 +133,12 @@ def _state_parts(state: StateStrength) -> _Parts:
     parts.append(f"  {_turns_words(state)}")
     parts.append("")  # behind a table there is one
     for bearing in state.bearings:
-        parts += _bearing_parts(bearing)
+        parts += _bearing_parts(bearing, reliability)
     what = "Wear and P" if any(bearing.life is not None for bearing in state.bearings) else "Wear"
     return [*parts, f"  {what}: means of {state.samples} samples; angles from each ring's x axis."]
 
 
-def _bearing_parts(bearing: BearingStrength) -> _Parts:
+def _bearing_parts(bearing: BearingStrength, reliability: float) -> _Parts:
     rings, element = (bearing.inner, bearing.outer), RATED[bearing.element]
     at = f"{bearing.peak_time:.5g} s"
     if bearing.peak_angle is not None:
@@ -160,7 +162,7 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         }
     parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
-        f"  {_verdict(bearing)}",
+        f"  {_verdict(bearing, reliability)}",
         f"  load ratings: dynamic C_r {_force(bearing.dynamic_rating)} "
         f"({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
         f"static C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
@@ -189,34 +191,48 @@ def _bearing_parts(bearing: BearingStrength) -> _Parts:
         words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, {film}"
         lives[words] = bearing.modified_life
     known = {name: life for name, life in lives.items() if life is not None}
-    return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]
+    return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()}, reliability)]
 
 
-def _verdict(bearing: BearingStrength) -> str:
+def _verdict(bearing: BearingStrength, reliability: float) -> str:
     """What the numbers mean."""
     held = "bears its highest load" if bearing.static_safety >= 1.0 else "brinells at its highest load"
     verdict = f"It {held}: static safety s_0 {bearing.static_safety:.3g}."
     shortest = bearing.life if bearing.modified_life is None else bearing.modified_life
     if shortest is None:
         return verdict
-    hours = bearing.hours(shortest)
+    hours = RELIABILITY[reliability] * bearing.hours(shortest)
     spent = f"{hours:.0f} h or longer" if hours < MILLION else "more than a million hours"
-    return f"{verdict} 90 % of such bearings run {'without limit' if math.isinf(shortest) else spent}."
+    return (
+        f"{verdict} {_percent(reliability)} of such bearings run {'without limit' if math.isinf(shortest) else spent}."
+    )
 
 
-def _duty_parts(life: DutyLife) -> _Parts:
+def _duty_parts(life: DutyLife, reliability: float) -> _Parts:
     head = f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"
-    if life.hours is None or life.turns is None:
+    if life.hours is None or life.turns is None or life.basic_hours is None or life.basic_turns is None:
         return ["", head, f"  No rating life. {life.why_no_life}"]
-    lives = {"reference L_10r": (life.turns, life.hours)}
+    basic = f"basic L_10, mean load P_m {_force(life.mean_load)}"
+    lives = {basic: (life.basic_turns, life.basic_hours), "reference L_10r": (life.turns, life.hours)}
     if life.modified_hours is not None and life.modified_turns is not None:
         lives["modified L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
-    return ["", head, _lives(lives), f"  Damage: {shares}."]
+    return ["", head, _lives(lives, reliability), f"  Damage: {shares}."]
 
 
-def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
-    """Lives in turns and hours."""
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def _lives(lives: Mapping[str, tuple[float, float]], reliability: float) -> ReportTable:
+    """Lives in turns and hours; those of more than 90 % of the bearings are a_1 times as long."""
+    factor = RELIABILITY[reliability]
+    if factor < 1.0:
+        failed = f"L_{100.0 * (1.0 - reliability):.0f}"
+        lives = {
+            name.replace("L_10", failed).replace("L_n", failed): (factor * turns, factor * spent)
+            for name, (turns, spent) in lives.items()
+        }
     columns = {"~life": lambda row: row[0], ">million turns": lambda row: row[1][0], ">hours": lambda row: row[1][1]}
     return ReportTable.of([(name, _life(*life)) for name, life in lives.items()], columns)
 

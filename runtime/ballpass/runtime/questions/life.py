@@ -27,6 +27,16 @@ StepperMethod = Annotated[
     Option(words="`auto`, or one of the stepper's.", shown="NAME", names=option_names.stepper_methods),
 ]
 
+Reliability = Annotated[
+    float,
+    Option(
+        words="Share of the bearings that reach the lives of the report: 90, 95, 96, 97, 98 or 99 %.",
+        example='"95 %"',
+        shown="SHARE",
+        unit="1",
+    ),
+]
+
 #: Clearances of the figure of life, and steady turns of each.
 POINTS, TURNS = 17, 64
 
@@ -59,6 +69,7 @@ def life(
     cycles: Cycles = None,
     *,
     transient: Transient = None,
+    reliability: Reliability = 0.9,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     method: StepperMethod = None,
@@ -78,7 +89,8 @@ def life(
     Raises
     ------
     RequestError
-        A wrong request, a linkage that cannot be assembled, or a scene without bearing.
+        A wrong request, a reliability that is not of the table of ISO 281, a linkage that cannot be assembled, or a
+        scene without bearing.
     SimulationError
         The computation failed.
 
@@ -90,6 +102,7 @@ def life(
     """
     from ballpass.runtime.life.report import life_report
     from ballpass.runtime.point.run_start import run_numbers, start_of
+    from ballpass.runtime.ratings.life import of_table
     from ballpass.runtime.request.request import Request
 
     numbers = run_numbers(model, parameters)
@@ -101,7 +114,7 @@ def life(
         initial=start_of(model, numbers, initial),
     )
     with shown("simulating for life", progress) as tell:
-        return life_report(model, dict(parameters or {}), replace(request, progress=tell))
+        return life_report(model, dict(parameters or {}), replace(request, progress=tell), of_table(reliability))
 
 
 def _pressure(

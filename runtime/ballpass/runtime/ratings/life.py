@@ -183,10 +183,22 @@ def modified_life(life: Any, factor: Any, reliability: float = 0.90) -> Any:
     RequestError
         A reliability that is not in the table.
     """
-    if reliability not in RELIABILITY:
-        known = ", ".join(f"{share:g}" for share in RELIABILITY)
-        raise RequestError(f"No a_1 is tabulated for the reliability {reliability:g}. Allowed: {known}.")
-    return RELIABILITY[reliability] * factor * life
+    return RELIABILITY[of_table(reliability)] * factor * life
+
+
+def of_table(reliability: float) -> float:
+    """The reliability of the table of a_1 that is meant [1].
+
+    Raises
+    ------
+    RequestError
+        It is none of them.
+    """
+    for share in RELIABILITY:
+        if abs(share - reliability) < 1e-9:
+            return share
+    known = ", ".join(f"{share:g}" for share in RELIABILITY)
+    raise RequestError(f"No a_1 is tabulated for the reliability {reliability:g}. Allowed: {known}.")
 
 
 def ball_ratings(
