@@ -31,6 +31,8 @@ def test_an_overhung_crank_loads_its_bearings_by_levers(crank: Model) -> None:
     constants = crank.constants()
     assert constants["bearings.front.share"] == pytest.approx(5.0 / 3.0, rel=1e-15)
     assert constants["bearings.rear.share"] == pytest.approx(-2.0 / 3.0, rel=1e-15)
+    words = " ".join(str(crank.explain()).split())
+    assert "Levers: of a force in the plane that positions count from carry front 1.67, rear -0.667" in words
 
 
 @pytest.mark.parametrize("seed", range(20))

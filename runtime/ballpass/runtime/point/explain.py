@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -107,6 +107,7 @@ class Explanation(ShortRepr, Reported):
     unusual : sentences about numbers outside of their usual ranges
     turns : after which all loads repeat, two for a four-stroke engine
     first : time that the first of them take [s]
+    levers : share of a force in the plane that positions count from, by bearings with one [1]
 
     Examples
     --------
@@ -130,6 +131,7 @@ class Explanation(ShortRepr, Reported):
     limits: tuple[str, ...] = ()
     turns: int = 1
     first: float = math.inf
+    levers: Mapping[str, float] = field(default_factory=dict)
 
     def _report(self) -> Report:
         repeats = self.first
@@ -158,6 +160,11 @@ class Explanation(ShortRepr, Reported):
         parts += ["", table] if self.scales else []
         parts += [f"no equilibrium at {place}" for place in self.unsupported]
         parts += ["", Marked("Method", "head", f": auto takes {self.method}, {self.reason}")]
+        if self.levers:
+            carried = ", ".join(f"{name} {rounded(share, 3)}" for name, share in self.levers.items())
+            parts.append(
+                Marked("Levers", "head", f": of a force in the plane that positions count from carry {carried}")
+            )
         parts += [Marked("Unusual", "doubt", f": {words}") for words in self.unusual]
         parts += [Marked("Limits", "doubt", f": {words}") for words in self.limits]
         scales = [
@@ -174,6 +181,7 @@ class Explanation(ShortRepr, Reported):
             "time_scales": scales,
             "without_equilibrium": self.unsupported,
             "method": {"auto": self.method, "reason": self.reason},
+            "levers": dict(self.levers),
             "warnings": self.unusual,
             "limits": self.limits,
         }
@@ -213,6 +221,11 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         reason=reason,
         unusual=tuple(unusual(manifest, values)),
         limits=tuple(limits_of_model(manifest, values)),
+        levers={
+            bearing.name: values[f"{bearing.path}.share"]
+            for bearing in manifest.bearings
+            if f"{bearing.path}.lever_per_moment" in values
+        },
     )
 
 
