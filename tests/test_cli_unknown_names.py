@@ -18,6 +18,7 @@ from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.run import run
+from ballpass.runtime.app.commands.select import select
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import trade
@@ -69,7 +70,7 @@ UNKNOWN: Mapping[str | None, tuple[str, ...]] = {
 #: What names no quantity of any scene begins with.
 NOWHERE = ("mx", "value:inner.y@2x")
 
-QUESTIONED = {declared(question).name: question for question in (*QUESTIONS, trade)}
+QUESTIONED = {declared(question).name: question for question in (*QUESTIONS, select, trade)}
 COMMANDS: Mapping[str, Callable[..., Any]] = {
     **QUESTIONED,
     **{command.__name__: command for command in (animate, run, stream, sweep)},
@@ -127,6 +128,7 @@ def in_python(model: Model, command: str, given: Mapping[str, str]) -> str | Non
         "run": lambda: model.quantities(given["of"]) if "of" in given else model.simulate(**given),
         "sweep": lambda: model.simulate_many({"bearing.clearance": [1e-6]}, **{"observables": "rms:inner.y", **named}),
         "stream": lambda: model.stream("long.nc", sample_rate=1e3, outputs=[given["of"]]),
+        "select": lambda: model.quantities(given["of"]),
         "trade": lambda: measure_trade(model, [given["of"]]),
     }
     if command == "animate":

@@ -226,6 +226,7 @@ REFUSED = {
     "life": ("", "this scene has no bearing"),
     "linearize": ("", "this scene has no states"),
     "section": ("", "this scene has no bearing"),
+    "select": ("", "this scene has no bearing"),
     "steady": ("", "this scene has no bearing"),
     "trade": ("", "this scene has no states"),
     "jacobian": ("--of=drive_torque --wrt=states", "this scene has no states"),

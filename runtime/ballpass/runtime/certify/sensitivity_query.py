@@ -336,8 +336,8 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities) 
     signals = ChannelValues(model, [*names, *([state] if state else [])]).along(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
-    turned = timeline.driver(manifest, numbers.values).at(times)[0] % TURN
-    angles = past(signals[state].value[order, 0]) if state else turned
+    known = timeline.driver(manifest, numbers.values)
+    angles = past(signals[state].value[order, 0] if state else known.at(times)[0])
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)
