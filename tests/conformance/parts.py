@@ -244,6 +244,7 @@ window = { start = "350 deg", end = "190 deg" }
 """
 _HOOK = ("[mechanism.frame.points]\n", '[mechanism.frame.points]\nhook = ["250 mm", "180 mm"]\n')
 _POINT = '[mechanism.forces.it]\nbody = "lever"\npoint = "tip"\n'
+_PISTON = _POINT + 'direction = "190 deg"\nbore = "16 mm"\n'
 _BODY = '[mechanism.torques.it]\nbody = "lever"\n'
 #: One through zero, one in radians below it.
 _WINDOW = """window = [
@@ -256,6 +257,12 @@ _ENDS = 'bodies = ["crank", "lever"]\npoints = ["A", "tip"]\n'
 _TURN = 'bodies = ["crank", "lever"]\n'
 #: Keys of the scene file, and the numbers that scale the force.
 FORCES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "forces PistonPressure Windows": (_PISTON + 'pressure = "7 bar"\n' + _WINDOW, ("bore",)),
+    "forces PistonPressure AngleTable": (
+        _PISTON + 'table = { angle = ["-20 deg", "30 deg", "190 deg"], pressure = ["1 bar", "700 kPa", "0.05 MPa"] }\n',
+        ("bore",),
+    ),
+    "forces PistonPressure ConstantForce": (_PISTON + 'pressure = "7 bar"\nambient = "1.2 bar"\n', ("bore",)),
     "forces PointForce Windows": (_POINT + 'force = ["1500 N", "90 N"]\n' + _WINDOW, ("force.x", "force.y")),
     "forces PointForce AngleTable": (
         _POINT + 'direction = "10 deg"\ntable = { angle = ["-20 deg", "30 deg", "190 deg"], '
@@ -437,7 +444,11 @@ QUICK = (
     *("damping law one-sided", "damping law tangent", "damping law hunt-crossley"),
     *("rolling element cylindrical-roller", "rolling element ball at a contact angle"),
     *("effect ball_waviness", "effect defects", "drive table", "drive asynchronous"),
-    *("force forces PointForce Windows", "force forces PointForce AngleTable", "force springs TwoPoints SpringDamper"),
+    *(
+        "force forces PointForce Windows",
+        "force forces PistonPressure AngleTable",
+        "force springs TwoPoints SpringDamper",
+    ),
     *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR"),
 )
 PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads())

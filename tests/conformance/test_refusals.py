@@ -11,6 +11,7 @@ from ballpass.derive import derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 
+PISTON, STEADY = "forces PistonPressure AngleTable", "forces PistonPressure ConstantForce"
 SPRING, PIN = "springs TwoPoints SpringDamper", "friction JointTurn Friction"
 WALL, TABLE, WINDOW = "stops AlongDirection Stop", "forces PointForce AngleTable", "forces PointForce Windows"
 
@@ -57,6 +58,15 @@ WRONG = [
     (TABLE, 'direction = "10 deg"\n', "", r"it\.direction.*missing"),
     (TABLE, "table =", 'force = ["1 N", "2 N"]\ntable =', r"it\.force.*unknown key"),
     (TABLE, "table =", 'window = { start = "1 deg", end = "2 deg" }\ntable =', r"it\.table.*delete one of the two"),
+    (PISTON, "pressure =", "force =", r"table\.pressure.*missing"),
+    (PISTON, '"700 kPa"', '"700 N"', r"pressure\.2.*a pressure or an elastic modulus"),
+    (PISTON, 'direction = "190 deg"\n', "", r"it\.direction.*missing"),
+    (PISTON, '"16 mm"', '"-16 mm"', r"it\.bore.*negative"),
+    (PISTON, "table =", 'pressure = "2 bar"\ntable =', r"it\.pressure.*unknown key"),
+    (PISTON, 'bore = "16 mm"\n', "", r"table\.force.*missing"),
+    (STEADY, 'pressure = "7 bar"\n', "", r"it\.pressure.*missing"),
+    (STEADY, '"1.2 bar"', '"-1.2 bar"', r"it\.ambient.*negative"),
+    (STEADY, "pressure =", 'force = ["1 N", "2 N"]\npressure =', r"it\.force.*unknown key"),
     (
         WINDOW,
         "window =",

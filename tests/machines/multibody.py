@@ -19,7 +19,7 @@ from ball_effects import taken
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from ballpass.derive.mechanism.forces import BodyTorque, Friction, PointForce, Windows
+from ballpass.derive.mechanism.forces import BodyTorque, Friction, PistonPressure, PointForce, Windows
 from ballpass.derive.mechanism.forces.along_direction import AlongDirection
 from ballpass.derive.mechanism.forces.angle_table import AngleTable
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
@@ -257,7 +257,12 @@ class Multibody(Absolute):
             path, law = force.pathway, force.law
             gate = self.gate(force.name, angle) if isinstance(law, Windows) else 1.0
             rows = self.interpolated(law, angle) if isinstance(law, AngleTable) else None
-            if isinstance(path, PointForce):
+            if isinstance(path, PistonPressure):
+                place = self.place(path.body, self.arm(path.body, path.point), q, v)
+                over = (self.value(path.pressure) if rows is None else rows) - self.value(path.ambient)
+                size = gate * over * math.pi * (self.value(path.bore) / 2.0) ** 2
+                out += size * self.along(path.direction) @ place.jacobian
+            elif isinstance(path, PointForce):
                 place = self.place(path.body, self.arm(path.body, path.point), q, v)
                 vector = gate * self.vector(path.force) if rows is None else rows * self.along(path.direction)
                 out += vector @ place.jacobian

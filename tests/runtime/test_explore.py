@@ -245,6 +245,7 @@ def test_pages_of_other_machines_give_native_peaks_and_positions(
         ("offset_slider", ""),
         ("punching_press_roller", ""),
         ("rotor_two_bearings", "pulley."),
+        ("v_compressor", "front."),
         ("varying_compliance", ""),
     ],
 )

@@ -255,8 +255,8 @@ class Record:
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
         """Applied forces that act at a time: name, (body, point), components (2,) [N]."""
-        parameters = self.solution.parameters
-        values = self.model.inputs_at(t, parameters)
+        parameters = self._values
+        values = self.model.inputs_at(t, self.solution.parameters)
         inputs = {info.name: value for info, value in zip(self.manifest.inputs, values, strict=True)}
         acting = []
         for name, body, point, given in self.mechanism.forces:
@@ -286,7 +286,7 @@ class Record:
             ahead, width = past(angle, start), past(end, start)
             return float(np.interp(ahead, [0.0, rise, width - rise, width], [0.0, 1.0, 1.0, 0.0]))
         columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
-        knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
+        knots, values = ([v for n, v in self._values.items() if n.startswith(c)] for c in columns)
         return float(np.interp(angle, knots, values, period=TURN * dict(self.mechanism.turns).get(f"force.{name}", 1)))
 
     def spring_tension(self, label: str) -> Array | None:

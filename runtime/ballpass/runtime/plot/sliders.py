@@ -22,7 +22,7 @@ READ_IN = {
     "rad": "deg",
     "rad/s": "rpm",
     "kg*m^2": "kg*mm^2",
-    "Pa": "GPa",
+    "Pa": "bar",
     "s*m^0.5": "s*mm^0.5",
     "m^2/s": "mm^2/s",
 }
@@ -83,7 +83,8 @@ def sliders(manifest: Manifest, values: Mapping[str, float], units: Mapping[str,
     for info in manifest.parameters:
         value = values[info.name]
         small = info.unit == "m" and (abs(value) < SMALL if value else info.name.endswith(".clearance"))
-        unit = units.get(info.name) or ("um" if small else READ_IN.get(info.unit, info.unit))
+        common = "um" if small else "GPa" if info.name.endswith("modulus") else READ_IN.get(info.unit, info.unit)
+        unit = units.get(info.name) or common
         low, high, logarithmic = _range(manifest, info, value, values)
         rows.append(
             {

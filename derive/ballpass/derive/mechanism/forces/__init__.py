@@ -11,6 +11,7 @@ from ballpass.derive.mechanism.forces.constant import ConstantForce
 from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
 from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.joint_motion import JointMotion, JointTravel, JointTurn
+from ballpass.derive.mechanism.forces.piston_pressure import PistonPressure
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.stop import Stop
@@ -29,11 +30,13 @@ __all__ = [
     "Law",
     "Pathway",
 ]
-__all__ += ["NO_FORCES", "PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_springs"]
+__all__ += ["NO_FORCES", "PistonPressure", "PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_springs"]
 
 #: In the order in which their numbers are listed; a force has the pathway and law whose key is given, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
-    ForceTable("forces", "force", "body, point and force", (PointForce,), (Windows, AngleTable, ConstantForce)),
+    ForceTable(
+        "forces", "force", "body, point and force", (PistonPressure, PointForce), (Windows, AngleTable, ConstantForce)
+    ),
     ForceTable("torques", "torque", "body and torque", (BodyTorque,), (Windows, AngleTable, ConstantForce)),
     ForceTable("springs", "spring", "bodies, points and stiffness", (TwoPoints,), (SpringDamper,)),
     ForceTable("torsion_springs", "spring", "bodies and stiffness", (TwoBodies,), (SpringDamper,)),

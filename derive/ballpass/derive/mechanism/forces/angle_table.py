@@ -53,7 +53,7 @@ class AngleTable(Law):
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The table's value."""
-        knots, values = ([q.path for q in column] for column in (self.angle, self.values))
+        knots, values = [q.path for q in self.angle], force.pathway.amounts(self.values, force, setting)
         drive, unit = setting.linkage.drive, force.pathway.unit
         return setting.over_angle(drive.table(force.label, unit, knots, values, self.turns))
 

@@ -11,7 +11,7 @@ A law gives an amount.  The pathway multiplies it by its own direction, and give
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
@@ -24,6 +24,7 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.body_keys import Points, check_names
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table, listing, upright
@@ -97,12 +98,14 @@ class Pathway(ABC):
     key : the key of the scene that selects it; empty for the default pathway of a table
     measure : the size that a law may depend on; None where there is none
     column, unit : of a law that gives an amount, not a factor: "force" in "N"
+    column_unit : of the column where it is no amount itself: "pressure" in "Pa"
     """
 
     __slots__ = ()
     key: ClassVar[str] = ""
     column: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
+    column_unit: ClassVar[str] = ""
     measure: ClassVar[Measure | None] = None
 
     @classmethod
@@ -121,7 +124,11 @@ class Pathway(ABC):
     def fill(cls, name: str, body: str) -> dict[str, str]:
         """What placeholders in the keys of a force with this pathway stand for."""
         found = {"NAME": name, "INDEX": upright(name), "BODY": body.replace("_", " "), "PLACE": f"the window of {name}"}
-        found |= {"THE_COLUMN": cls.column.capitalize(), "COLUMN": cls.column, "COLUMN_UNIT": cls.unit}
+        found |= {
+            "THE_COLUMN": cls.column.capitalize(),
+            "COLUMN": cls.column,
+            "COLUMN_UNIT": cls.column_unit or cls.unit,
+        }
         measure = cls.measure
         if measure is not None:
             found |= {"THE_SIZE": measure.size.capitalize(), "SIZE": measure.size, "SIZE_UNIT": measure.size_unit}
@@ -132,6 +139,10 @@ class Pathway(ABC):
     @abstractmethod
     def act(self, force: Force, setting: Setting) -> Action:
         """Place it in the linkage."""
+
+    def amounts(self, values: Sequence[SceneNumber], force: Force, setting: Setting) -> list[str]:
+        """Names of the amounts that a column gives."""
+        return [value.path for value in values]
 
     @abstractmethod
     def words(self) -> str:

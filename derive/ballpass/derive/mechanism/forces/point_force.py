@@ -9,7 +9,7 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import body_point, scale
+from ballpass.derive.mechanism.kinematics import Pair, body_point, scale
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import SceneNumber, Vector
@@ -25,14 +25,14 @@ class PointForce(Pathway):
     body: str = BODY.declared()
     point: str = TextKey(words="The point of it where the force acts", example="C").declared()
     force: Vector = force_key(
-        "the force NAME on the BODY", "F", "INDEX", when="required without `table`", length_limits=AMOUNT
+        "the force NAME on the BODY", "F", "INDEX", when="required without `table` and `bore`", length_limits=AMOUNT
     ).declared()
     direction: SceneNumber | None = quantity(
         "rad",
         "Direction of the force NAME on the BODY",
         r"\alpha_{INDEX}",
         "180 deg",
-        when="required with `table`, else refused",
+        when="required with `table` or `bore`, else refused",
     )
 
     @classmethod
@@ -41,14 +41,17 @@ class PointForce(Pathway):
         return {"direction": None} if law.factor else {"force": Vector(kind="zero")}
 
     def act(self, force: Force, setting: Setting) -> Action:
-        """The force times the law's factor."""
-        point = body_point(setting.linkage.mechanism, self.body, self.point)
-        vector = components(self.force)
-        if self.direction is not None:
-            angle = symbol_of(self.direction)
-            vector = sp.cos(angle), sp.sin(angle)
+        """The vector times an amount or a factor."""
+        point, vector = body_point(setting.linkage.mechanism, self.body, self.point), self.vector(force, setting)
         here = AppliedLoad(body=self.body, at=self.point, point=point)
         return Action(loads=lambda amount: (replace(here, force=scale(amount, vector)),))
+
+    def vector(self, force: Force, setting: Setting) -> Pair:
+        """The force, or the direction alone."""
+        if self.direction is None:
+            return components(self.force)
+        angle = symbol_of(self.direction)
+        return sp.cos(angle), sp.sin(angle)
 
     def words(self) -> str:
         """Force and point."""
