@@ -248,6 +248,21 @@ class Catalogue:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ClassFit:
+    """Fits by class of shaft and housing, None where the scene gives none; the derived equations do not depend on them.
+
+    `inner` and `outer` are the interferences of shaft and bore, and of outer ring and housing, empty without a class;
+    `clearance` is that in operation: each least, lowest probable, mean, highest probable, largest [m].
+    """
+
+    shaft: str | None
+    housing: str | None
+    inner: tuple[float, ...]
+    outer: tuple[float, ...]
+    clearance: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Lubrication:
     """Lubricant film and contamination, for the life factor of ISO 281; the derived equations do not depend on it.
 
@@ -371,8 +386,8 @@ class Bearing:
     stand side by side (None: one); `beside` names the first of several at the joint, whose inner ring moves alike.
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication` and `alignment` are None where the
-    scene says nothing of that kind.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication`, `alignment` and `fit` (by class) are
+    None where the scene says nothing of that kind.
     """
 
     one_of: ClassVar[tuple[Either, ...]] = (
@@ -516,6 +531,7 @@ class Bearing:
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None
     alignment: Alignment | None = None
+    fit: ClassFit | None = None
 
     @property
     def prefix(self) -> str:

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
-from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
+from ballpass.derive.scene.bearing_records import Bearing, Catalogue, ClassFit, Lubrication
 from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, QuantityKey, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, not_negative, positive, quantity
@@ -583,7 +583,7 @@ class Scene:
 def _structure(value: Any) -> object:
     if isinstance(value, SceneNumber):
         return (value.path, value.unit, value.description, value.latex)
-    if isinstance(value, Catalogue | Lubrication):
+    if isinstance(value, Catalogue | ClassFit | Lubrication):
         return None
     if is_dataclass(value) and not isinstance(value, type):
         return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))

@@ -250,6 +250,17 @@ class CatalogueInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FitInfo:
+    """A bearing's fits by class: see `ballpass.derive.scene.bearing_records.ClassFit`; in m."""
+
+    shaft: str | None
+    housing: str | None
+    inner: tuple[float, ...]
+    outer: tuple[float, ...]
+    clearance: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LubricationInfo:
     """Lubricant film and contamination: see `ballpass.derive.scene.bearing_records.Lubrication`; viscosity in m^2/s."""
 
@@ -308,6 +319,7 @@ class BearingInfo:
     inner_stands: bool = False
     beside: str = ""
     alignment: AlignmentInfo | None = None
+    fit: FitInfo | None = None
 
     def inner_state(self, name: str) -> str:
         """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""
