@@ -182,3 +182,38 @@ class DutyLife(ShortRepr):
     basic_turns: float | None
     damage: Mapping[str, float]
     why_no_life: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class FitSpread(ShortRepr):
+    """A bearing over the clearances that its fits by class leave.
+
+    All numbers are for the least, lowest probable, mean, highest probable and largest clearance in this order; probable
+    is within three standard deviations.
+
+    Attributes
+    ----------
+    name, state : of the bearing, and of the duty cycle
+    shaft, housing : classes; None where the scene gives none
+    inner, outer : interferences, the largest first: each its own spread; empty without a class [m]
+    clearance : in operation [m]
+    lives : L_10r in turns; empty where there is no life
+    peak_forces : highest forces of any ball [N]
+    turns : steady turns of each run; None: as long as the scene says
+
+    Examples
+    --------
+    >>> model.life(cycles=4, transient=2).fits  # the scene gives no classes
+    ()
+    """
+
+    name: str
+    state: str
+    shaft: str | None
+    housing: str | None
+    inner: tuple[float, ...]
+    outer: tuple[float, ...]
+    clearance: tuple[float, ...]
+    lives: tuple[float, ...]
+    peak_forces: tuple[float, ...]
+    turns: float | None

@@ -168,5 +168,5 @@ def _number(head: str, diameter: float) -> float:
     steps = [step for step in _STEPS if step[0] is not None and millimetres <= step[0]]
     found = steps[0][_HEADS.index(head)] if steps and millimetres > RANGE[0] else None
     if found is None:
-        raise ValueError(f"the table has none for {millimetres:g} mm")
+        raise ValueError(f"the tables of fits have no such class for a diameter of {millimetres:g} mm")
     return found / 1e6
