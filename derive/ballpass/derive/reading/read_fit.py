@@ -25,20 +25,22 @@ from ballpass.runtime.ratings.tolerances import Spread
 Change = Callable[[float, float, float], float]
 
 
-def _interference(words: str) -> Any:
+def _interference(words: str, seat: str) -> Any:
     return not_negative(
         "m",
         f"Effective interference of {words}",
         example="10 um",
         optional=True,
         setting=True,
+        when=f"optional, instead of `{seat}`",
         remedy="delete the key: a fit with play changes no clearance",
     )
 
 
 def _class(words: str, choices: tuple[str, ...]) -> Any:
     note = "ISO 286, with a ring of class Normal, ISO 492"
-    return ChoiceKey(words=f"Tolerance class of {words}", choices=choices, optional=True, note=note).declared()
+    words = f"Tolerance class of {words}"
+    return ChoiceKey(words=words, choices=choices, optional=True, when="optional", note=note).declared()
 
 
 def _size(words: str, example: str) -> Any:
@@ -68,10 +70,10 @@ class Fit:
         example="6 um",
         default="0 um",
         setting=True,
-        note="0.4 of it reduces the interference of a class, DIN 7190-1",
+        note="0.4 of it reduces the interference of a class",
     )
-    inner_interference: float | None = _interference("shaft and bore")
-    outer_interference: float | None = _interference("outer ring and housing")
+    inner_interference: float | None = _interference("shaft and bore", "shaft")
+    outer_interference: float | None = _interference("outer ring and housing", "housing")
     bore: float | None = _size("Bore of the bearing", "20 mm")
     outside_diameter: float | None = _size("Outside diameter of the bearing", "47 mm")
     inner_warming: float = _warming("inner")

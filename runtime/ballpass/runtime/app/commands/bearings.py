@@ -19,8 +19,10 @@ def bearings(
     pattern: Annotated[
         str, Option(shown="PATTERN", words="Designations wanted: 6204, 63*, 61?/*.", positional=True)
     ] = "*",
-    shaft: Annotated[str | None, Option(words="Class of shafts whose interference to show, as k6.")] = None,
-    housing: Annotated[str | None, Option(words="Class of housings, likewise, as H7.")] = None,
+    shaft: Annotated[
+        str | None, Option(shown="CLASS", words="Class of shafts whose interference to show, as k6.")
+    ] = None,
+    housing: Annotated[str | None, Option(shown="CLASS", words="Class of housings, likewise, as H7.")] = None,
     json_: options.Json = False,
 ) -> None:
     """Print the bearings that a scene can name by designation: dimensions, balls, ratings and normal clearance; with
