@@ -71,10 +71,9 @@ def limits_of_fit(bearing: BearingInfo, values: Mapping[str, float]) -> Iterator
     fit = bearing.fit
     if fit is None:
         return
-    # of a bearing without a joint whose inner ring stands, the outer one turns
-    outer = bearing.inner_stands and not bearing.joint
+    outer = bearing.inner_stands  # at a joint such a bearing swings, and neither ring turns
     ring, name, pressed = ("outer", fit.housing, fit.outer) if outer else ("inner", fit.shaft, fit.inner)
-    if pressed and pressed[0] < HOLDING and not (bearing.inner_stands and bearing.joint):
+    if pressed and pressed[0] < HOLDING and not (outer and bearing.joint):
         yield (
             f"the {ring} ring turns against the load and may creep on its seat: with {name} its least interference is "
             f"{1e6 * pressed[0]:.1f} µm, the least probable one {1e6 * pressed[1]:.1f} µm. Take a tighter class."
