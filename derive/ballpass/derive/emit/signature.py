@@ -91,7 +91,7 @@ def life_info(bearing: Bearing) -> dict[str, Any]:
         "catalogue": catalogue and info_of(mf.CatalogueInfo, catalogue, clearance_least=least, clearance_most=most),
         "lubrication": lubrication and info_of(mf.LubricationInfo, lubrication),
         "alignment": alignment and info_of(mf.AlignmentInfo, alignment),
-        "fit": bearing.fit and info_of(mf.FitInfo, bearing.fit),
+        "fit": bearing.fit,
     }
 
 

@@ -10,13 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from ballpass.derive.scene.bearing_records import Catalogue, ClassFit
+from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
 from ballpass.derive.scene.keys import ChoiceKey
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings import tolerances
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
 from ballpass.runtime.ratings.tolerances import Spread
@@ -82,7 +83,7 @@ class Fit:
 
 def mounted(
     table: Table, catalogue: Catalogue | None, clearance: SceneNumber, ball_diameter: float, pitch_diameter: float
-) -> tuple[SceneNumber, Catalogue | None, ClassFit | None]:
+) -> tuple[SceneNumber, Catalogue | None, FitInfo | None]:
     """Clearance in operation, the catalogue with the range of its group in operation, and fits by class."""
     if not table.has("fit"):
         return clearance, catalogue, None
@@ -108,9 +109,7 @@ def mounted(
     spread = None
     if fit.shaft or fit.housing:
         fives = [ring.five if name else () for name, (ring, _) in zip((fit.shaft, fit.housing), rings, strict=True)]
-        spread = ClassFit(
-            shaft=fit.shaft, housing=fit.housing, inner=fives[0], outer=fives[1], clearance=operating.five
-        )
+        spread = FitInfo(shaft=fit.shaft, housing=fit.housing, inner=fives[0], outer=fives[1], clearance=operating.five)
     return replace(clearance, value=clearance.value - lost), catalogue, spread
 
 
@@ -139,10 +138,7 @@ def _pressed(
     if not name:
         return Spread.within(given or 0.0, given or 0.0), rate
     try:
-        if seat == "shaft":
-            parts = tolerances.shaft_deviations(name, diameter), tolerances.bore_deviations(diameter)
-        else:
-            parts = tolerances.outside_deviations(diameter), tolerances.housing_deviations(name, diameter)
+        return tolerances.seat_interference(name, diameter, fit.roughness), rate
     except ValueError as fault:
         data.fault(
             seat,
@@ -152,4 +148,3 @@ def _pressed(
             remedy="give the effective interference of the ring instead",
         )
         return nothing
-    return tolerances.interference(*parts, fit.roughness), rate

@@ -10,6 +10,7 @@ from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import CONTAMINATION
 from ballpass.runtime.ratings.lubrication import FILTERS, GRADES
 
@@ -245,21 +246,6 @@ class Catalogue:
     static_rating: float | None = _rating("C_0")
     fatigue_limit: float | None = _rating("C_u")
     mounting_loss: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClassFit:
-    """Fits by class of shaft and housing, None where the scene gives none; the derived equations do not depend on them.
-
-    `inner` and `outer` are the interferences of shaft and bore, and of outer ring and housing, empty without a class;
-    `clearance` is that in operation: each least, lowest probable, mean, highest probable, largest [m].
-    """
-
-    shaft: str | None
-    housing: str | None
-    inner: tuple[float, ...]
-    outer: tuple[float, ...]
-    clearance: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -531,7 +517,7 @@ class Bearing:
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None
     alignment: Alignment | None = None
-    fit: ClassFit | None = None
+    fit: FitInfo | None = None
 
     @property
     def prefix(self) -> str:

@@ -16,13 +16,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
-from ballpass.derive.scene.bearing_records import Bearing, Catalogue, ClassFit, Lubrication
+from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
 from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, QuantityKey, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.contract.defaults import TOLERANCES
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.show import html
 
@@ -583,7 +584,7 @@ class Scene:
 def _structure(value: Any) -> object:
     if isinstance(value, SceneNumber):
         return (value.path, value.unit, value.description, value.latex)
-    if isinstance(value, Catalogue | ClassFit | Lubrication):
+    if isinstance(value, Catalogue | FitInfo | Lubrication):
         return None
     if is_dataclass(value) and not isinstance(value, type):
         return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))

@@ -251,7 +251,11 @@ class CatalogueInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitInfo:
-    """A bearing's fits by class: see `ballpass.derive.scene.bearing_records.ClassFit`; in m."""
+    """Fits by class of shaft and housing, None where the scene gives none; the derived equations do not depend on them.
+
+    `inner` and `outer` are the interferences of shaft and bore, and of outer ring and housing, empty without a class;
+    `clearance` is that in operation: each least, lowest probable, mean, highest probable, largest [m].
+    """
 
     shaft: str | None
     housing: str | None

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import hours
 from ballpass.runtime.ratings.oscillation import Oscillation
 from ballpass.runtime.ratings.tilt import Tilt
@@ -194,8 +195,7 @@ class FitSpread(ShortRepr):
     Attributes
     ----------
     name, state : of the bearing, and of the duty cycle
-    shaft, housing : classes; None where the scene gives none
-    inner, outer : interferences, the largest first: each its own spread; empty without a class [m]
+    fit : classes and interferences [m]
     clearance : in operation [m]
     lives : L_10r in turns; empty where there is no life
     peak_forces : highest forces of any ball [N]
@@ -209,10 +209,7 @@ class FitSpread(ShortRepr):
 
     name: str
     state: str
-    shaft: str | None
-    housing: str | None
-    inner: tuple[float, ...]
-    outer: tuple[float, ...]
+    fit: FitInfo
     clearance: tuple[float, ...]
     lives: tuple[float, ...]
     peak_forces: tuple[float, ...]

@@ -230,9 +230,9 @@ def _fit_table(fit: FitSpread, reliability: float) -> ReportTable:
         "": lambda k: ("least", "probable", "mean", "probable", "largest")[k],
         ">clearance\n[µm]": lambda k: f"{1e6 * fit.clearance[k]:.1f}",
     }
-    for seat, pressed in ((fit.shaft, fit.inner), (fit.housing, fit.outer)):
-        if pressed:
-            columns[f">{seat}\n[µm]"] = lambda k, pressed=pressed: f"{1e6 * pressed[k]:.1f}"  # type: ignore[misc]
+    for seat, pressed in ((fit.fit.shaft, fit.fit.inner), (fit.fit.housing, fit.fit.outer)):
+        if pressed:  # the largest with the least clearance
+            columns[f">{seat}\n[µm]"] = lambda k, pressed=pressed: f"{1e6 * pressed[-1 - k]:.1f}"  # type: ignore[misc]
     if fit.lives:
         columns[">life\n[million turns]"] = lambda k: _life(factor * fit.lives[k], 0.0)[0]
     columns[">peak ball force\n[N]"] = lambda k: f"{fit.peak_forces[k]:.0f}"

@@ -114,7 +114,8 @@ def life(
     )
     with shown("simulating for life", progress) as tell:
         report = life_report(model, dict(parameters or {}), replace(request, progress=tell), of_table(reliability))
-    return replace(report, fits=tuple(_fits(model, report, parameters or {}, cycles, transient, rtol, method)))
+    options = {"cycles": cycles, "transient": transient, "rtol": rtol, "method": method}
+    return replace(report, fits=tuple(_fits(model, report, parameters or {}, **options)))
 
 
 def _turning(
@@ -126,15 +127,7 @@ def _turning(
     return state, {**parameters, **(duty.get(state.name, {}) if state is not None else {})}
 
 
-def _fits(
-    model: AnyModel,
-    report: LifeReport,
-    parameters: Mapping[str, float],
-    cycles: float | None,
-    transient: float | None,
-    rtol: float | None,
-    method: str | None,
-) -> Iterator[FitSpread]:
+def _fits(model: AnyModel, report: LifeReport, parameters: Mapping[str, float], **options: Any) -> Iterator[FitSpread]:
     """Life and peak of every bearing with a fit by class, over its clearances."""
     from ballpass.runtime.life.records import FitSpread
     from ballpass.runtime.ratings.of_bearing import fit_clearances
@@ -144,20 +137,15 @@ def _fits(
         if info.fit is None or state is None:
             continue
         clearances = np.array(fit_clearances(info, model.numbers(numbers).values))
-        peak, life = f"{info.prefix}peak_ball_force", f"{info.prefix}life"
-        names = [peak] if bearing.why_no_life else [peak, life]
-        options = {"rtol": rtol, "method": method}
-        found, turns = _over_clearances(model, info, numbers, clearances, names, cycles, transient, **options)
+        names = [f"{info.prefix}peak_ball_force", *([] if bearing.why_no_life else [f"{info.prefix}life"])]
+        found, turns = _over_clearances(model, info, numbers, clearances, names, **options)
         yield FitSpread(
             name=info.name,
             state=state.name,
-            shaft=info.fit.shaft,
-            housing=info.fit.housing,
-            inner=info.fit.inner[::-1],
-            outer=info.fit.outer[::-1],
+            fit=info.fit,
             clearance=tuple(clearances.tolist()),
-            lives=tuple(found[life].tolist()) if life in names else (),
-            peak_forces=tuple(found[peak].tolist()),
+            lives=tuple(found[names[1]].tolist()) if len(names) > 1 else (),
+            peak_forces=tuple(found[names[0]].tolist()),
             turns=turns,
         )
 

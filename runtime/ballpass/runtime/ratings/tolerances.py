@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Literal
 
 #: Classes of the table below; it has neither j7 nor J8.
 _LETTERS = ("g", "h", "j", "js", "k", "m", "n", "p")
@@ -65,20 +66,14 @@ class Spread:
     @property
     def pressed(self) -> Spread:
         """The same of what is above zero: play presses nothing.  Moments of a normal distribution cut at zero."""
-        if self.least >= 0.0 or self.deviation == 0.0:
-            return Spread(
-                least=max(self.least, 0.0),
-                largest=max(self.largest, 0.0),
-                mean=max(self.mean, 0.0),
-                deviation=self.deviation,
-            )
-        normal = NormalDist(self.mean, self.deviation)
-        above, density = 1.0 - normal.cdf(0.0), self.deviation**2 * normal.pdf(0.0)
-        mean = self.mean * above + density
-        square = (self.mean**2 + self.deviation**2) * above + self.mean * density
-        return Spread(
-            least=0.0, largest=max(self.largest, 0.0), mean=mean, deviation=math.sqrt(max(square - mean**2, 0.0))
-        )
+        mean, deviation = self.mean, self.deviation
+        if self.least < 0.0 and deviation > 0.0:
+            normal = NormalDist(mean, deviation)
+            above, density = 1.0 - normal.cdf(0.0), deviation**2 * normal.pdf(0.0)
+            square = (mean**2 + deviation**2) * above + mean * density
+            mean = mean * above + density
+            deviation = math.sqrt(max(square - mean**2, 0.0))
+        return Spread(least=max(self.least, 0.0), largest=max(self.largest, 0.0), mean=mean, deviation=deviation)
 
 
 def shaft_deviations(name: str, diameter: float) -> tuple[float, float]:
@@ -124,14 +119,16 @@ def housing_deviations(name: str, diameter: float) -> tuple[float, float]:
     return upper - width, upper
 
 
-def bore_deviations(diameter: float) -> tuple[float, float]:
-    """Lower and upper deviation of a bearing's bore, ISO 492, class Normal [m]."""
-    return -_number("bore", diameter), 0.0
+def ring_deviations(diameter: float, kind: Literal["bore", "outside"]) -> tuple[float, float]:
+    """Lower and upper deviation of a bearing's bore or outside diameter, ISO 492, class Normal [m]."""
+    return -_number(kind, diameter), 0.0
 
 
-def outside_deviations(diameter: float) -> tuple[float, float]:
-    """Lower and upper deviation of a bearing's outside diameter, ISO 492, class Normal [m]."""
-    return -_number("outside", diameter), 0.0
+def seat_interference(name: str, diameter: float, roughness: float = 0.0) -> Spread:
+    """Interference of a ring of class Normal with a shaft or housing of a class [m]; `ValueError` as above."""
+    if name in SHAFTS:
+        return interference(shaft_deviations(name, diameter), ring_deviations(diameter, "bore"), roughness)
+    return interference(ring_deviations(diameter, "outside"), housing_deviations(name, diameter), roughness)
 
 
 def interference(inner: Sequence[float], outer: Sequence[float], roughness: float = 0.0) -> Spread:

@@ -36,7 +36,8 @@ def bearings(
                 raise RequestError(f"No class of the tables of fits is {given!r:.60}. Allowed: {', '.join(allowed)}.")
         found = [_row(kind) for name, kind in types.items() if fnmatchcase(name, pattern)]
         for row in found:
-            row["interference"] = _interferences(row, shaft, housing)
+            sizes = {shaft: row["bore"], housing: row["outside_diameter"]}
+            row["interference"] = _interferences({name: size for name, size in sizes.items() if name is not None})
         if not found:
             raise RequestError(
                 f"No bearing of the table is called {pattern!r:.60}. Allowed: designations and patterns, as 6204, 63*. "
@@ -77,19 +78,13 @@ def bearings(
         show_parts(table)
 
 
-def _interferences(row: dict[str, Any], shaft: str | None, housing: str | None) -> dict[str, tuple[float, float]]:
-    """Least and largest interference by class [m]; without those of diameters that the tables of fits have not."""
+def _interferences(sizes: dict[str, float]) -> dict[str, tuple[float, float]]:
+    """Least and largest interference by class, of its diameter [m]; none where the tables of fits have not that one."""
     found = {}
-    bore, outside = row["bore"], row["outside_diameter"]
-    with suppress(ValueError):
-        if shaft is not None:
-            spread = tolerances.interference(tolerances.shaft_deviations(shaft, bore), tolerances.bore_deviations(bore))
-            found[shaft] = spread.least, spread.largest
-    with suppress(ValueError):
-        if housing is not None:
-            seat = tolerances.housing_deviations(housing, outside)
-            spread = tolerances.interference(tolerances.outside_deviations(outside), seat)
-            found[housing] = spread.least, spread.largest
+    for name, diameter in sizes.items():
+        with suppress(ValueError):
+            spread = tolerances.seat_interference(name, diameter)
+            found[name] = spread.least, spread.largest
     return found
 
 
