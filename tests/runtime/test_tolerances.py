@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 from ballpass.runtime import Model
 from ballpass.runtime.point.model_limits import limits_of_fit
-from ballpass.runtime.ratings import tolerances
+from ballpass.runtime.ratings import of_bearing, tolerances
 from ballpass.runtime.ratings.of_bearing import fit_clearances
 from ballpass.runtime.ratings.tolerances import Spread
 
@@ -177,6 +177,19 @@ def test_life_and_peak_over_the_clearance_are_those_of_runs_at_each(fitted: Mode
     least, shaft, housing = (1e6 * x for x in (fit.clearance[0], fit.fit.inner[4], fit.fit.outer[4]))
     assert row[1:4] == [f"{least:.1f}", f"{shaft:.1f}", f"{housing:.1f}"]  # the largest interferences
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_clearance_that_cannot_be_run_is_told_and_the_others_stand(
+    fitted: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As with a preload that flattens balls beyond what a bearing can have."""
+    monkeypatch.setattr(of_bearing, "fit_clearances", lambda *_: (-5e-3, 0.0, 5e-6, 10e-6, 20e-6))
+    report = fitted.life(cycles=3, transient=1)
+    (fit,) = report.fits
+    assert np.isnan(fit.lives).tolist() == np.isnan(fit.peak_forces).tolist() == [True, *4 * [False]]
+    (said,) = fit.failed
+    assert said.startswith("-5000.0 µm of clearance: ")
+    assert said in report.report().warnings
 
 
 def test_the_spread_moves_with_a_clearance_that_is_set(fitted: Model) -> None:

@@ -200,6 +200,7 @@ class FitSpread(ShortRepr):
     lives : L_10r in turns; empty where there is no life
     peak_forces : highest forces of any ball [N]
     turns : steady turns of each run; None: as long as the scene says
+    failed : why runs failed, whose lives and forces are NaN
 
     Examples
     --------
@@ -214,3 +215,4 @@ class FitSpread(ShortRepr):
     lives: tuple[float, ...]
     peak_forces: tuple[float, ...]
     turns: float | None
+    failed: tuple[str, ...]

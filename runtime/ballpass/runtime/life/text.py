@@ -94,7 +94,12 @@ class LifeReport(Reported):
             facts=facts,
             records=records,
             index=("state", "bearing"),
-            warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
+            warnings=(
+                *(words for fit in self.fits for words in fit.failed),
+                *self.unsettled,
+                *self.beyond,
+                *dict.fromkeys(swinging),
+            ),
         )
 
     def _meanings(self) -> _Parts:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import BearingInfo
     from ballpass.runtime.life.records import BearingStrength, FitSpread, StateStrength
     from ballpass.runtime.life.text import LifeReport
+    from ballpass.runtime.many.chunks import MemberFailure
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.point.run_start import Initial
 
@@ -138,7 +139,7 @@ def _fits(model: AnyModel, report: LifeReport, parameters: Mapping[str, float], 
             continue
         clearances = np.array(fit_clearances(info, model.numbers(numbers).values))
         names = [f"{info.prefix}peak_ball_force", *([] if bearing.why_no_life else [f"{info.prefix}life"])]
-        found, turns = _over_clearances(model, info, numbers, clearances, names, **options)
+        found, turns, failed = _over_clearances(model, info, numbers, clearances, names, **options)
         yield FitSpread(
             name=info.name,
             state=state.name,
@@ -147,6 +148,7 @@ def _fits(model: AnyModel, report: LifeReport, parameters: Mapping[str, float], 
             lives=tuple(found[names[1]].tolist()) if len(names) > 1 else (),
             peak_forces=tuple(found[names[0]].tolist()),
             turns=turns,
+            failed=tuple(f"{1e6 * clearances[one.member]:.1f} µm of clearance: {one.message}" for one in failed),
         )
 
 
@@ -159,8 +161,9 @@ def _over_clearances(
     cycles: float | None = None,
     transient: float | None = None,
     **options: Any,
-) -> tuple[dict[str, NDArray[np.float64]], float | None]:
-    """Quantities over clearances of a bearing, and the steady turns of each run; None: as long as the scene says."""
+) -> tuple[dict[str, NDArray[np.float64]], float | None, tuple[MemberFailure, ...]]:
+    """Quantities over clearances of a bearing, NaN of runs that failed, and the steady turns of each run; None: as long
+    as the scene says."""
     from ballpass.runtime.time.repetition import Repetition
 
     table = {key: np.full(len(clearances), value) for key, value in overrides.items()}
@@ -172,7 +175,8 @@ def _over_clearances(
     found = model.simulate_many(table, [*names], cycles=cycles, transient=transient, **options)
     if found.interrupted:
         raise KeyboardInterrupt
-    return {name: np.asarray(found[name]) for name in names}, None if cycles is None else cycles - skipped
+    turns = None if cycles is None else cycles - skipped
+    return {name: np.asarray(found[name]) for name in names}, turns, found.failures
 
 
 def _pressure(
@@ -221,5 +225,5 @@ def _clearance(
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
     name = f"{info.prefix}life"
-    found, turns = _over_clearances(model, info, overrides, clearances, [name])
+    found, turns, _ = _over_clearances(model, info, overrides, clearances, [name])
     return figures.life_of_clearance(title, bearing, clearances, found[name], present, group, turns)
