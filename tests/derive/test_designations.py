@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -221,6 +222,31 @@ def test_fits_and_temperatures_reduce_clearance_and_group() -> None:
     assert found.catalogue.clearance_range == pytest.approx((13e-6 - lost, 28e-6 - lost), rel=1e-9, abs=0.0)
 
 
+def test_classes_of_fits_give_the_mean_clearance_in_operation_and_its_spread() -> None:
+    """20k6 +2 to +15 and a bore of 0 to -10 µm press by 13.5 µm in the middle, of which bore over raceway is lost."""
+    found = bearing(named("6204", "C3", 'fit = { shaft = "k6", housing = "H7", inner_warming = "8 K" }\n'))
+    inner = 33.5 - 7.9375
+    rate, warm = 20 / inner, 11.5e-6 * (inner * 8.0 + 2 * 7.9375 * 4.0) * 1e-3
+    assert found.fit is not None
+    assert found.fit.inner == pytest.approx(
+        (2e-6, 13.5e-6 - math.hypot(13e-6, 10e-6) / 2, 13.5e-6, 13.5e-6 + math.hypot(13e-6, 10e-6) / 2, 25e-6)
+    )
+    assert (found.fit.outer[0], found.fit.outer[2], found.fit.outer[4]) == pytest.approx((-36e-6, -18e-6, 0.0))
+    spread = math.hypot(15e-6, rate * 13e-6, rate * 10e-6) / 2
+    mean = 20.5e-6 - rate * 13.5e-6 - warm
+    expected = (13e-6 - rate * 25e-6 - warm, mean - spread, mean, mean + spread, 28e-6 - rate * 2e-6 - warm)
+    assert found.fit.clearance == pytest.approx(expected, rel=1e-4)
+    assert found.clearance.value == pytest.approx(found.fit.clearance[2], rel=1e-12)
+    assert found.catalogue is not None
+    assert sum(found.catalogue.clearance_range or ()) / 2 == pytest.approx(found.clearance.value)
+
+
+def test_numbers_of_fits_change_no_code() -> None:
+    """A class is a number of the scene: law 1."""
+    scenes = [read(named("6204", more=f'fit = {{ shaft = "{name}" }}\n')) for name in ("k6", "m5")]
+    assert scenes[0].structure() == scenes[1].structure()
+
+
 def test_a_group_may_stand_where_a_number_is_written() -> None:
     scene = read(named("6204", more='fit = { inner_warming = "8 K" }\n'))
     lost = 11.5e-6 * ((33.5 - 7.9375) * 8.0 + 2 * 7.9375 * 4.0) * 1e-3
@@ -254,6 +280,13 @@ def test_a_group_may_stand_where_a_number_is_written() -> None:
             "only together with designation",
         ),
         (named("6204", more='dynamic_rating = "-1 kN"\n'), "bearing.dynamic_rating", "a value above zero"),
+        (named("6204", more='fit = { shaft = "k9" }\n'), "bearing.fit.shaft", '"k5", "k6", "k7"'),
+        (named("618/3", more='fit = { shaft = "k6" }\n'), "bearing.fit.shaft", "no such class for a diameter of 3 mm"),
+        (
+            named("6204", more='fit = { housing = "H7", outer_interference = "1 um" }\n'),
+            "bearing.fit",
+            "the fit of the housing is given twice",
+        ),
         (
             named("6204", more='fit = { inner_interference = "-1 um" }\n'),
             "bearing.fit.inner_interference",

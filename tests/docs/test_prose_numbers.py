@@ -301,6 +301,9 @@ NAMED: dict[str, dict[str, str]] = {
         "is 2 to 3 % lower for NU204": "= 100 - 100 * 25100 / 25719, 100 - 100 * 29700 / 30593",
     },
     "docs/theory/life.md": {
+        "by 0.4 of the sum": "ratings/tolerances.py",
+        "DIN 7190-1:2017": "ratings/tolerances.py",
+        "editions say 0.8": "ratings/tolerances.py",
         "has 4200 MPa in": "a limit of the standard",
         "a peak pressure above 4200 MPa": "a limit of the standard",
         "above 500 000 mm/min": "a limit of the catalogues, in other units in life/limits.py",
@@ -354,6 +357,9 @@ NAMED: dict[str, dict[str, str]] = {
         "by more than 0.5 % of its range and no rms by more than 1 %": "settle.py",
     },
     "docs/reference/scene.md": {
+        "Diameters above 3 mm to 180 mm": "ratings/tolerances.py",
+        "to 120 mm,": "ratings/tolerances.py",
+        "from above 6 mm": "ratings/tolerances.py",
         "at most 64 characters": "table.py",
         "turned by 180°": "geometry",
         "has 76 % of its amount": "tanh 1",

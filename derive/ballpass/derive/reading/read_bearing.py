@@ -100,7 +100,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         facts = {"element": element.name, "contact": "stiffness" if stiff else "grooves"}
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS}, choices_of(Bearing)[:1], facts)
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
-        numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
+        numbers["clearance"], catalogue, fit = mounted(table, catalogue, numbers["clearance"], ball, pitch)
         return Bearing(
             name=name,
             joint=joint,
@@ -121,6 +121,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             cage=read_cage(table),
             lubrication=read_lubrication(table),
             alignment=read_alignment(table),
+            fit=fit,
         )
 
 

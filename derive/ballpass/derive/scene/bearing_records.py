@@ -10,6 +10,7 @@ from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import CONTAMINATION
 from ballpass.runtime.ratings.lubrication import FILTERS, GRADES
 
@@ -371,8 +372,8 @@ class Bearing:
     stand side by side (None: one); `beside` names the first of several at the joint, whose inner ring moves alike.
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication` and `alignment` are None where the
-    scene says nothing of that kind.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication`, `alignment` and `fit` (by class) are
+    None where the scene says nothing of that kind.
     """
 
     one_of: ClassVar[tuple[Either, ...]] = (
@@ -516,6 +517,7 @@ class Bearing:
     cage: CageMotion | None = None
     lubrication: Lubrication | None = None
     alignment: Alignment | None = None
+    fit: FitInfo | None = None
 
     @property
     def prefix(self) -> str:

@@ -23,6 +23,7 @@ from ballpass.derive.scene.read_keys import Either, column, not_negative, positi
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.contract.defaults import TOLERANCES
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.show import html
 
@@ -583,7 +584,7 @@ class Scene:
 def _structure(value: Any) -> object:
     if isinstance(value, SceneNumber):
         return (value.path, value.unit, value.description, value.latex)
-    if isinstance(value, Catalogue | Lubrication):
+    if isinstance(value, Catalogue | FitInfo | Lubrication):
         return None
     if is_dataclass(value) and not isinstance(value, type):
         return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))

@@ -250,6 +250,21 @@ class CatalogueInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FitInfo:
+    """Fits by class of shaft and housing, None where the scene gives none; the derived equations do not depend on them.
+
+    `inner` and `outer` are the interferences of shaft and bore, and of outer ring and housing, empty without a class;
+    `clearance` is that in operation: each least, lowest probable, mean, highest probable, largest [m].
+    """
+
+    shaft: str | None
+    housing: str | None
+    inner: tuple[float, ...]
+    outer: tuple[float, ...]
+    clearance: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LubricationInfo:
     """Lubricant film and contamination: see `ballpass.derive.scene.bearing_records.Lubrication`; viscosity in m^2/s."""
 
@@ -308,6 +323,7 @@ class BearingInfo:
     inner_stands: bool = False
     beside: str = ""
     alignment: AlignmentInfo | None = None
+    fit: FitInfo | None = None
 
     def inner_state(self, name: str) -> str:
         """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""

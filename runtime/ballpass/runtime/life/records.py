@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import hours
 from ballpass.runtime.ratings.oscillation import Oscillation
 from ballpass.runtime.ratings.tilt import Tilt
@@ -182,3 +183,36 @@ class DutyLife(ShortRepr):
     basic_turns: float | None
     damage: Mapping[str, float]
     why_no_life: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class FitSpread(ShortRepr):
+    """A bearing over the clearances that its fits by class leave.
+
+    All numbers are for the least, lowest probable, mean, highest probable and largest clearance in this order; probable
+    is within three standard deviations.
+
+    Attributes
+    ----------
+    name, state : of the bearing, and of the duty cycle
+    fit : classes and interferences [m]
+    clearance : in operation [m]
+    lives : L_10r in turns; empty where there is no life
+    peak_forces : highest forces of any ball [N]
+    turns : steady turns of each run; None: as long as the scene says
+    failed : why runs failed, whose lives and forces are NaN
+
+    Examples
+    --------
+    >>> model.life(cycles=4, transient=2).fits  # the scene gives no classes
+    ()
+    """
+
+    name: str
+    state: str
+    fit: FitInfo
+    clearance: tuple[float, ...]
+    lives: tuple[float, ...]
+    peak_forces: tuple[float, ...]
+    turns: float | None
+    failed: tuple[str, ...]

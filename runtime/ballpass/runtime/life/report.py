@@ -21,6 +21,7 @@ from ballpass.runtime.life.text import LifeReport
 from ballpass.runtime.life.wear import LoadSamples, load_samples, wear_field
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.point.model_limits import limits_of_fit
 from ballpass.runtime.ratings import life
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.lubrication import contamination_of_class, contamination_of_code, viscosity
@@ -144,7 +145,11 @@ def _bearing(
     tilt = _tilt(info, values, load)
     return replace(
         strength,
-        beyond=(*limits_of(info, moving, strength, history.fastest), *filter(None, (tilt.beyond,))),
+        beyond=(
+            *limits_of(info, moving, strength, history.fastest),
+            *filter(None, (tilt.beyond,)),
+            *limits_of_fit(info, values),
+        ),
         oscillation=_oscillation(info, values, ratings, samples, load, force) if why and turning else None,
         tilt=tilt,
     )

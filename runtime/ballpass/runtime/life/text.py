@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 
-from ballpass.runtime.life.records import BearingStrength, DutyLife, RingStrength, StateStrength
+from ballpass.runtime.life.records import BearingStrength, DutyLife, FitSpread, RingStrength, StateStrength
 from ballpass.runtime.ratings.elements import RATED
 from ballpass.runtime.ratings.life import MILLION, RELIABILITY
 from ballpass.runtime.ratings.wear import COEFFICIENTS
@@ -27,6 +27,7 @@ class LifeReport(Reported):
     states : of the duty cycle, one for a scene without
     duty : life of each bearing over the cycle; empty for a scene without
     reliability : share of bearings that reach the lives of the text; all others are those of 90 % [1]
+    fits : of each bearing with a fit by class, over the clearances that it leaves, in the first state that turns
 
     Examples
     --------
@@ -40,6 +41,7 @@ class LifeReport(Reported):
     states: tuple[StateStrength, ...]
     duty: tuple[DutyLife, ...]
     reliability: float = 0.9
+    fits: tuple[FitSpread, ...] = ()
 
     @property
     def bearings(self) -> tuple[BearingStrength, ...]:
@@ -87,11 +89,17 @@ class LifeReport(Reported):
             title=f"{self.title}: strength and life of its bearings",
             parts=[*(part for state in self.states for part in _state_parts(state, self.reliability))]
             + [part for life in self.duty for part in _duty_parts(life, self.reliability)]
+            + [part for fit in self.fits for part in ("", _fit_table(fit, self.reliability))]
             + self._meanings(),
             facts=facts,
             records=records,
             index=("state", "bearing"),
-            warnings=(*self.unsettled, *self.beyond, *dict.fromkeys(swinging)),
+            warnings=(
+                *(words for fit in self.fits for words in fit.failed),
+                *self.unsettled,
+                *self.beyond,
+                *dict.fromkeys(swinging),
+            ),
         )
 
     def _meanings(self) -> _Parts:
@@ -218,6 +226,29 @@ def _duty_parts(life: DutyLife, reliability: float) -> _Parts:
         lives["modified L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
     return ["", head, _lives(lives, reliability), f"  Damage: {shares}."]
+
+
+def _fit_table(fit: FitSpread, reliability: float) -> ReportTable:
+    """Interferences, clearance, life and peak over the spread of the fits."""
+    factor, run = RELIABILITY[reliability], "the scene's length" if fit.turns is None else f"{fit.turns:.4g} turns"
+    columns: dict[str, Callable[[int], str]] = {
+        "": lambda k: ("least", "probable", "mean", "probable", "largest")[k],
+        ">clearance\n[µm]": lambda k: f"{1e6 * fit.clearance[k]:.1f}",
+    }
+    for seat, pressed in ((fit.fit.shaft, fit.fit.inner), (fit.fit.housing, fit.fit.outer)):
+        if pressed:  # the largest with the least clearance
+            columns[f">{seat}\n[µm]"] = lambda k, pressed=pressed: f"{1e6 * pressed[-1 - k]:.1f}"  # type: ignore[misc]
+    if fit.lives:
+        columns[">life\n[million turns]"] = lambda k: _life(factor * fit.lives[k], 0.0)[0]
+    columns[">peak ball force\n[N]"] = lambda k: f"{fit.peak_forces[k]:.0f}"
+    where = ", ".join(filter(None, (fit.name and f"bearing {fit.name}", fit.state and f"state {fit.state}")))
+    return ReportTable.of(
+        range(len(fit.clearance)),
+        columns,
+        title="Over the clearance in operation" + (where and f", {where}"),
+        caption=f"{run} each. Interferences of shaft and housing by class, the largest with the least clearance; each "
+        "column has limits of its own. Probable: within three standard deviations.",
+    )
 
 
 def _percent(share: float) -> str:

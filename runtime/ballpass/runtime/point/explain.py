@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -26,6 +26,7 @@ from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.point.slopes import jacobian
+from ballpass.runtime.ratings.of_bearing import fit_clearances
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
@@ -108,6 +109,7 @@ class Explanation(ShortRepr, Reported):
     turns : after which all loads repeat, two for a four-stroke engine
     first : time that the first of them take [s]
     levers : share of a force in the plane that positions count from, by bearings with one [1]
+    fits : sentences about interferences and clearances by class of fit
 
     Examples
     --------
@@ -132,6 +134,7 @@ class Explanation(ShortRepr, Reported):
     turns: int = 1
     first: float = math.inf
     levers: Mapping[str, float] = field(default_factory=dict)
+    fits: tuple[str, ...] = ()
 
     def _report(self) -> Report:
         repeats = self.first
@@ -165,6 +168,7 @@ class Explanation(ShortRepr, Reported):
             parts.append(
                 Marked("Levers", "head", f": of a force in the plane that positions count from carry {carried}")
             )
+        parts += [Marked("Fits", "head", f": {words}") for words in self.fits]
         parts += [Marked("Unusual", "doubt", f": {words}") for words in self.unusual]
         parts += [Marked("Limits", "doubt", f": {words}") for words in self.limits]
         scales = [
@@ -184,6 +188,7 @@ class Explanation(ShortRepr, Reported):
             "levers": dict(self.levers),
             "warnings": self.unusual,
             "limits": self.limits,
+            "fits": self.fits,
         }
         return Report(parts=parts, facts=facts, records=scales, index=("name",))
 
@@ -226,7 +231,24 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
             for bearing in manifest.bearings
             if f"{bearing.path}.lever_per_moment" in values
         },
+        fits=tuple(_fits(manifest, values)),
     )
+
+
+def _fits(manifest: Manifest, values: Mapping[str, float]) -> Iterator[str]:
+    """Interferences and clearance of each bearing with a fit by class."""
+    for info in manifest.bearings:
+        if info.fit is None:
+            continue
+        lengths = {
+            f"interference on the shaft, {info.fit.shaft}": info.fit.inner,
+            f"interference in the housing, {info.fit.housing}": info.fit.outer,
+            "clearance in operation": fit_clearances(info, values),
+        }
+        for words, spread in lengths.items():
+            if spread:
+                least, low, mean, high, largest = (f"{1e6 * each:.1f}" for each in spread)
+                yield f"{info.path}: {words}: {least} to {largest} µm, probably {low} to {high}, mean {mean}"
 
 
 def _places(breakpoints: Sequence[Breakpoint], repeats: float) -> str:

@@ -1,5 +1,6 @@
 """Where a model's simplifications decide about its forces: sentences, with the command that measures it.
 
+Where fits by class may let a ring creep, or take the whole clearance.
 In: a manifest and values of its parameters and constants.  Out: sentences; none where nothing is to be said.
 """
 
@@ -8,9 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.ratings.of_bearing import inner_ring_mass
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
+from ballpass.runtime.ratings.of_bearing import fit_clearances, inner_ring_mass
 
+#: Interference that holds a ring: above rounding [m].
+HOLDING = 1e-9
 _BODY, _MASS = "mechanism.bodies.", ".mass"
 
 
@@ -22,6 +25,7 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
     values : parameters and derived constants by name
     """
     for bearing in manifest.bearings:
+        yield from (f"{bearing.path}: {words}" for words in limits_of_fit(bearing, values))
         gap, apart = (values.get(f"{bearing.path}.{name}", 0.0) for name in ("radial_gap", "groove_centre_distance"))
         if gap > 0.0:
             enough = math.sqrt(apart**2 - (apart - 0.5 * values[f"{bearing.path}.clearance"]) ** 2)
@@ -59,4 +63,24 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
         yield (
             f"{', '.join(sudden)}: the load begins and ends at once. Peaks behind its edges are the overshoot of a "
             'sudden load; a real one rises: give its window a rise, as rise = "5 deg".'
+        )
+
+
+def limits_of_fit(bearing: BearingInfo, values: Mapping[str, float]) -> Iterator[str]:
+    """A ring that may creep, and a clearance that may be lost, where fits are given by class."""
+    fit = bearing.fit
+    if fit is None:
+        return
+    outer = bearing.inner_stands  # at a joint such a bearing swings, and neither ring turns
+    ring, name, pressed = ("outer", fit.housing, fit.outer) if outer else ("inner", fit.shaft, fit.inner)
+    if pressed and pressed[0] < HOLDING and not (outer and bearing.joint):
+        yield (
+            f"the {ring} ring turns against the load and may creep on its seat: with {name} its least interference is "
+            f"{1e6 * pressed[0]:.1f} µm, the least probable one {1e6 * pressed[1]:.1f} µm. Take a tighter class."
+        )
+    least, probable, *_ = fit_clearances(bearing, values)
+    if least < 0.0:
+        yield (
+            f"the least clearance in operation is {1e6 * least:.1f} µm, the least probable one {1e6 * probable:.1f} "
+            "µm: below zero is preload. Take a larger group of clearance, or a looser class."
         )

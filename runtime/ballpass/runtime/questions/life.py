@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from ballpass.runtime.show.progress import Progress, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from ballpass.runtime.contract.manifest import BearingInfo
-    from ballpass.runtime.life.records import BearingStrength
+    from ballpass.runtime.life.records import BearingStrength, FitSpread, StateStrength
     from ballpass.runtime.life.text import LifeReport
+    from ballpass.runtime.many.chunks import MemberFailure
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.point.run_start import Initial
 
@@ -48,12 +50,10 @@ def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, f
     """Figures of every bearing in the first state of the duty cycle in which something turns."""
     from ballpass.runtime.plot import life as figures
 
-    state = next((state for state in report.states if state.bearings), None)
+    state, numbers = _turning(model, report, parameters)
     if state is None:
         return
     title = f"{report.title}, {state.name}" if state.name else report.title
-    duty = {info.name: dict(info.parameters) for info in model.manifest.duty}
-    numbers = {**parameters, **duty.get(state.name, {})}
     for info, bearing in zip(model.manifest.bearings, state.bearings, strict=True):
         ending = f"_{bearing.name}" if bearing.name else ""
         if bearing.inner.damage:
@@ -114,7 +114,69 @@ def life(
         initial=start_of(model, numbers, initial),
     )
     with shown("simulating for life", progress) as tell:
-        return life_report(model, dict(parameters or {}), replace(request, progress=tell), of_table(reliability))
+        report = life_report(model, dict(parameters or {}), replace(request, progress=tell), of_table(reliability))
+    options = {"cycles": cycles, "transient": transient, "rtol": rtol, "method": method}
+    return replace(report, fits=tuple(_fits(model, report, parameters or {}, **options)))
+
+
+def _turning(
+    model: AnyModel, report: LifeReport, parameters: Mapping[str, float]
+) -> tuple[StateStrength | None, dict[str, float]]:
+    """The first state of the duty cycle in which something turns, None without one, and its overrides."""
+    state = next((state for state in report.states if state.bearings), None)
+    duty = {info.name: dict(info.parameters) for info in model.manifest.duty}
+    return state, {**parameters, **(duty.get(state.name, {}) if state is not None else {})}
+
+
+def _fits(model: AnyModel, report: LifeReport, parameters: Mapping[str, float], **options: Any) -> Iterator[FitSpread]:
+    """Life and peak of every bearing with a fit by class, over its clearances."""
+    from ballpass.runtime.life.records import FitSpread
+    from ballpass.runtime.ratings.of_bearing import fit_clearances
+
+    state, numbers = _turning(model, report, parameters)
+    for info, bearing in zip(model.manifest.bearings, state.bearings if state is not None else (), strict=False):
+        if info.fit is None or state is None:
+            continue
+        clearances = np.array(fit_clearances(info, model.numbers(numbers).values))
+        names = [f"{info.prefix}peak_ball_force", *([] if bearing.why_no_life else [f"{info.prefix}life"])]
+        found, turns, failed = _over_clearances(model, info, numbers, clearances, names, **options)
+        yield FitSpread(
+            name=info.name,
+            state=state.name,
+            fit=info.fit,
+            clearance=tuple(clearances.tolist()),
+            lives=tuple(found[names[1]].tolist()) if len(names) > 1 else (),
+            peak_forces=tuple(found[names[0]].tolist()),
+            turns=turns,
+            failed=tuple(f"{1e6 * clearances[one.member]:.1f} µm of clearance: {one.message}" for one in failed),
+        )
+
+
+def _over_clearances(
+    model: AnyModel,
+    info: BearingInfo,
+    overrides: Mapping[str, float],
+    clearances: NDArray[np.float64],
+    names: Sequence[str],
+    cycles: float | None = None,
+    transient: float | None = None,
+    **options: Any,
+) -> tuple[dict[str, NDArray[np.float64]], float | None, tuple[MemberFailure, ...]]:
+    """Quantities over clearances of a bearing, NaN of runs that failed, and the steady turns of each run; None: as long
+    as the scene says."""
+    from ballpass.runtime.time.repetition import Repetition
+
+    table = {key: np.full(len(clearances), value) for key, value in overrides.items()}
+    table[f"{info.path}.clearance"] = clearances
+    skipped = model.run_settings.transient_cycles if transient is None else transient
+    repetition = Repetition.of(model.manifest, model.numbers(overrides).values)
+    if cycles is None and repetition.holds(repetition.driver.after(skipped)):
+        cycles = skipped + repetition.whole(TURNS)
+    found = model.simulate_many(table, [*names], cycles=cycles, transient=transient, **options)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    turns = None if cycles is None else cycles - skipped
+    return {name: np.asarray(found[name]) for name in names}, turns, found.failures
 
 
 def _pressure(
@@ -153,10 +215,8 @@ def _clearance(
 ) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.time.repetition import Repetition
 
-    name = f"{info.path}.clearance"
-    present = model.numbers(overrides).values[name]
+    present = model.numbers(overrides).values[f"{info.path}.clearance"]
     taken, group = info.catalogue, None
     least, most = (0.0, 2.0 * present) if present > 0.0 else (present - 10e-6, present + 20e-6)
     if taken is not None and taken.clearance_least is not None and taken.clearance_most is not None:
@@ -164,13 +224,6 @@ def _clearance(
         half = (taken.clearance_most - taken.clearance_least) / 2.0
         least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
     clearances = np.linspace(least, most, POINTS)
-    table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
-    transient = model.run_settings.transient_cycles
-    repetition = Repetition.of(model.manifest, model.numbers(overrides).values)
-    turns = repetition.whole(TURNS) if repetition.holds(repetition.driver.after(transient)) else None
-    cycles = None if turns is None else transient + turns
-    found = model.simulate_many(table, [f"{info.prefix}life"], cycles=cycles)
-    if found.interrupted:
-        raise KeyboardInterrupt
-    lives = np.asarray(found[f"{info.prefix}life"])
-    return figures.life_of_clearance(title, bearing, clearances, lives, present, group, turns)
+    name = f"{info.prefix}life"
+    found, turns, _ = _over_clearances(model, info, overrides, clearances, [name])
+    return figures.life_of_clearance(title, bearing, clearances, found[name], present, group, turns)

@@ -118,6 +118,17 @@ def radial_gap(bearing: BearingInfo, values: Mapping[str, float]) -> float:
     return values.get(f"{bearing.path}.radial_gap", 0.5 * values[f"{bearing.path}.clearance"])
 
 
+def fit_clearances(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[float, ...]:
+    """Least, lowest probable, mean, highest probable and largest clearance in operation by class of fit [m].
+
+    The spread is that of the scene file, about the clearance in `values`; empty without a class.
+    """
+    if bearing.fit is None:
+        return ()
+    mean = bearing.fit.clearance[2]
+    return tuple(values[f"{bearing.path}.clearance"] + (each - mean) for each in bearing.fit.clearance)
+
+
 def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: float) -> str:
     """Why no standard gives the bearing a life; empty where one does.
 
