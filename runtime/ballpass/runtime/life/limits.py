@@ -50,7 +50,8 @@ def limits_of(
             f"P = {load:.3g} N is {load / dynamic:.2g} C_r: below {LEAST_LOAD:g} C_r, the minimum load of makers' "
             f"catalogues, {noun}s slide, and wear decides, not fatigue. Preload it, or take a smaller bearing."
         )
-    pressure = max(found.inner.peak_pressure, found.outer.peak_pressure)
+    combined = () if found.combined is None else found.combined.peak_pressure
+    pressure = max(found.inner.peak_pressure, found.outer.peak_pressure, *combined)
     if pressure > element.static_pressure:
         yield (
             f"the peak pressure, {pressure / 1e6:.0f} MPa, exceeds {element.static_pressure / 1e6:.0f} MPa, the static "

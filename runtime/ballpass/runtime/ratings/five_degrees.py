@@ -1,8 +1,8 @@
 """Statics of a deep groove ball bearing in five degrees of freedom: radial and axial load, moments or tilt.
 
 In: geometry, loads, angle of a ball.  Out: `BallStatics`: displacements, load and contact angle of each ball,
-stiffness.  One call solves many loads at once, in NumPy.  Source: ISO 16281:2008.  The work of the contacts is a convex function of the
-displacements, so that the equilibrium is found from any start.
+stiffness.  One call solves many loads at once, in NumPy.  The work of the contacts is a convex function of the
+displacements, so that the equilibrium is found from any start.  Source: ISO 16281:2008.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def ball_statics(
     if tilt is not None:
         place[:, 3:] = tilt
 
-    def at(of: Array, where: Array) -> tuple[BallStatics, Array]:
+    def at(of: NDArray[np.intp], where: Array) -> tuple[BallStatics, Array]:
         found = contact_forces(bearing, where, angle[of])
         return found, (found.load - target[of])[:, :free] / scale
 
