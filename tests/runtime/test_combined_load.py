@@ -48,6 +48,21 @@ def test_with_next_to_no_axial_force_the_life_is_the_radial_one(made: Made) -> N
     assert combined.peak_force == pytest.approx(bearing.peak_force, rel=1e-3)
 
 
+def test_a_load_that_turns_with_the_shaft_meets_one_place_of_the_inner_ring(make_model: Callable[..., Model]) -> None:
+    """An unbalance without weight, in clearance: the life by statics is that of the motion's ball loads."""
+    model = make_model("rotor", ("[bearing]\n", '[bearing]\naxial_force = "0.001 N"\n'))
+    report = model.life(parameters={"loads.weight.force.y": 0.0}, cycles=40)
+    (bearing,) = report.bearings
+    assert bearing.combined is not None
+    assert bearing.combined.life == pytest.approx(bearing.life, rel=5e-3)
+    assert any("the minimum load" in words for words in report.beyond)
+
+
+def test_an_axial_force_counts_for_the_minimum_load(make_model: Callable[..., Model]) -> None:
+    report = make_model("rotor", ("[bearing]\n", '[bearing]\naxial_force = "200 N"\n')).life(cycles=22)
+    assert not any("the minimum load" in words for words in report.beyond)
+
+
 def test_the_life_is_that_of_the_statics_at_all_angles_of_the_cage(made: Made) -> None:
     model = made('axial_force = "1 kN"\nshoulder_height = "0.6 mm"')
     bearing, combined = found(model)
