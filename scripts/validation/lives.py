@@ -1,6 +1,7 @@
 """Lives against printed and measured ones: ``python -m scripts.validation.lives``.
 
-The reference rating life of a printed example, and run-to-failure tests of XJTU-SY; ``xjtu_lives.csv`` has their lives.
+The reference rating life of a printed example, radially and in five degrees of freedom, and run-to-failure tests of
+XJTU-SY; ``xjtu_lives.csv`` has their lives.
 """
 
 from __future__ import annotations
@@ -14,11 +15,36 @@ from scripts.validation.lines import HERE
 
 from ballpass.derive import generate
 from ballpass.runtime import Model, load
+from ballpass.runtime.life.combined_load import ball_bearing
 from ballpass.runtime.ratings import life
+from ballpass.runtime.ratings.five_degrees import ball_statics
 from ballpass.runtime.ratings.of_bearing import ratings_of
 
 #: Angles of ball 1 within a pitch at which the reference life is averaged.
 ANGLES = 24
+
+#: Of the printed rows with an axial load: clearance [m], F_r and F_a [N].
+COMBINED = ((0.0, 0.0, 1e3), (10e-6, 0.0, 1e3), (10e-6, 1e3, 1e3))
+
+
+def five_degrees() -> list[str]:
+    """Displacements and L_10r under axial and mixed load, the tilt free, a ball on the load's line."""
+    out = ["clearance  F_r     F_a     radial      axial        tilt         L_10r"]
+    with tempfile.TemporaryDirectory() as folder:
+        model = load(generate(HERE / "reference_life.toml", folder))
+    info = model.manifest.bearings[0]
+    for clearance, radial, axial in COMBINED:
+        values = model.numbers({"bearing.clearance": clearance}).values
+        ratings, found = ratings_of(info, values), ball_statics(ball_bearing(info, values), (radial, 0.0, axial))
+        loads, (x, _, z, _, tilt) = found.ball_load[0].tolist(), found.displacement[0]
+        equivalent = tuple(float(life.equivalent_ball_load(loads, turning=one)) for one in (True, False))
+        rated = (float(ratings.inner_ball), float(ratings.outer_ball))
+        turns = life.reference_life(rated, (equivalent[0], equivalent[1]))
+        out.append(
+            f"{1e6 * clearance:3.0f} um  {radial:6.0f} N {axial:6.0f} N {abs(1e6 * x):8.4f} um {1e6 * z:9.4f} um "
+            f"{abs(1e3 * tilt):7.4f} mrad {turns / 1e6:10.4f} million turns"
+        )
+    return out
 
 
 def reference_life() -> tuple[float, float, float]:
@@ -72,6 +98,8 @@ def printed() -> list[str]:
         f"approach of the rings, ball on the load's line: {1e6 * approach:.4f} um",
         f"L_10r, ball on the load's line: {on_line / 1e6:.1f} million turns",
         f"L_10r, mean over the cage's angle: {mean / 1e6:.1f} million turns",
+        "",
+        *five_degrees(),
         "",
         *tests,
     ]

@@ -48,6 +48,7 @@ TABLES = {
     "docs/theory/damping.md": "a definition",
     "docs/theory/rollers.md": "test_cylindrical_roller.py",
     "docs/validation/index.md": "test_validation.py",
+    "docs/validation/lives.md": "test_five_degrees.py",
     "docs/reference/scene.md": "test_keys.py, which makes the page anew",
 }
 
@@ -146,6 +147,8 @@ NAMED: dict[str, dict[str, str]] = {
         "prints 15.1101 µm and 13163.019 million": "the program's output",
         "ours are 7e-6 and 2e-5 away": "15.1102041/15.1101 - 1, 1 - 13162.7717/13163.019",
         "program has 12769.7 for": "an independent program",
+        "agree within 3e-5 and": "test_five_degrees.py",
+        "lives within 5e-5": "1630.6106/1630.5367 - 1 is 4.5e-5",
         "(8 balls of 7.92 mm on 34.55 mm,": "xjtu_uer204.toml",
         "12 820 N,": "the maker's rating",
         "6650 N)": "the maker's rating",

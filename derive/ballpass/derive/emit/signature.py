@@ -84,12 +84,14 @@ def info_of(kind: type[T], record: object, **others: Any) -> T:
 
 
 def life_info(bearing: Bearing) -> dict[str, Any]:
-    """What a bearing's life needs and its equations do not: catalogue, lubricant, misalignment, fits by class."""
+    """What a bearing's life needs and its equations do not: catalogue, lubricant, tilt, axial force, fits by class."""
     catalogue, lubrication, alignment = bearing.catalogue, bearing.lubrication, bearing.alignment
     least, most = (catalogue and catalogue.clearance_range) or (None, None)
     return {
         "catalogue": catalogue and info_of(mf.CatalogueInfo, catalogue, clearance_least=least, clearance_most=most),
         "lubrication": lubrication and info_of(mf.LubricationInfo, lubrication),
+        "axial_force": bearing.axial_force,
+        "shoulder_height": bearing.shoulder_height,
         "alignment": alignment and info_of(mf.AlignmentInfo, alignment),
         "fit": bearing.fit,
     }

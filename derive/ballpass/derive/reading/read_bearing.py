@@ -35,7 +35,7 @@ from ballpass.derive.scene.units import show
 #: Keys that every bearing has.
 _NUMBERS = (
     *("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle"),
-    *("contact_angle", "axial_displacement"),
+    *("contact_angle", "axial_displacement", "axial_force", "shoulder_height"),
 )
 #: Its other keys and tables.
 _TABLES = (

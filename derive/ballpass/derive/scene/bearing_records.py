@@ -358,6 +358,7 @@ _ONE_WAY = (
         remedy="write count = 2 instead of share = 0.5",
     ),
 )
+_AXIAL = (Needs(key="element", value="ball", why="a bearing of such elements carries no axial force"),)
 _ONLY_BALLS = (Needs(key="element", value="ball", why="a bearing of such elements has no contact angle"),)
 
 
@@ -379,7 +380,7 @@ class Bearing:
     one_of: ClassVar[tuple[Either, ...]] = (
         Either(
             what="the contact angle",
-            groups=(("contact_angle",), ("axial_displacement",)),
+            groups=(("contact_angle",), ("axial_displacement",), ("axial_force",)),
             at="axial_displacement",
             optional=True,
         ),
@@ -502,6 +503,27 @@ class Bearing:
         ),
         usual=UsualRange(most=0.03, of="ball_diameter", hint="Preload moves rings by some hundredths: check the unit."),
         note="the contact angle follows with `clearance` and grooves; not with a given `stiffness`",
+    )
+    axial_force: float | None = positive(
+        "N",
+        "Axial force on the bearing, in `ballpass life`",
+        example="500 N",
+        optional=True,
+        setting=True,
+        when="instead of `contact_angle`",
+        needs=_AXIAL,
+        remedy="delete the key where there is none",
+        note="of a shaft on the bearing that locates it; the motion stays radial, see {doc}`../theory/life`",
+    )
+    shoulder_height: float | None = positive(
+        "m",
+        "Height of the grooves' shoulders above their bottom",
+        example="1.6 mm",
+        optional=True,
+        setting=True,
+        needs=_AXIAL,
+        usual=UsualRange(most=0.5, of="ball_diameter", hint="Shoulders have about a fifth of the ball's diameter."),
+        note="`ballpass life` warns where axial force or tilt moves a contact over it",
     )
     ball_angle: SceneNumber = quantity(
         "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"

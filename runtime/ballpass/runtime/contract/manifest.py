@@ -305,7 +305,7 @@ class BearingInfo:
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
     `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
     whether the inner ring makes no whole turns; `beside` names the first of several two-way bearings of a joint, whose
-    inner rings move alike.
+    inner rings move alike.  `axial_force` [N] and `shoulder_height` [m] are those of the scene, for its life.
     """
 
     name: str
@@ -324,6 +324,8 @@ class BearingInfo:
     beside: str = ""
     alignment: AlignmentInfo | None = None
     fit: FitInfo | None = None
+    axial_force: float | None = None
+    shoulder_height: float | None = None
 
     def inner_state(self, name: str) -> str:
         """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""

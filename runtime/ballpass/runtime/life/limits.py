@@ -37,7 +37,8 @@ def limits_of(
     """
     element, geometry = rated_element(info), geometry_of(info, values)
     noun = element.noun
-    load, dynamic, static = found.equivalent_load, found.dynamic_rating, found.static_rating
+    combined, dynamic, static = found.combined, found.dynamic_rating, found.static_rating
+    load = (combined and combined.equivalent_load) or found.equivalent_load
     if not found.why_no_life and load > LARGEST_LOAD * dynamic:
         yield (
             f"P = {load:.4g} N is {load / dynamic:.2f} C_r: ISO 281 gives lives up to {LARGEST_LOAD:g} C_r. "
@@ -50,7 +51,8 @@ def limits_of(
             f"P = {load:.3g} N is {load / dynamic:.2g} C_r: below {LEAST_LOAD:g} C_r, the minimum load of makers' "
             f"catalogues, {noun}s slide, and wear decides, not fatigue. Preload it, or take a smaller bearing."
         )
-    pressure = max(found.inner.peak_pressure, found.outer.peak_pressure)
+    pressures = () if combined is None else combined.peak_pressure
+    pressure = max(found.inner.peak_pressure, found.outer.peak_pressure, *pressures)
     if pressure > element.static_pressure:
         yield (
             f"the peak pressure, {pressure / 1e6:.0f} MPa, exceeds {element.static_pressure / 1e6:.0f} MPa, the static "

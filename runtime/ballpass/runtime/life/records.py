@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ballpass.runtime.contract.manifest import FitInfo
+from ballpass.runtime.life.combined_load import CombinedLoad
 from ballpass.runtime.ratings.life import hours
 from ballpass.runtime.ratings.oscillation import Oscillation
 from ballpass.runtime.ratings.tilt import Tilt
@@ -61,7 +62,8 @@ class BearingStrength(ShortRepr):
     assumed : whether grooves and steel are the reference ones, for the scene gives a stiffness
     peak_force : highest force of any ball [N], at `peak_time` [s], of ball `peak_ball`, counted from 1, at the angle
         `peak_angle` of driver or shaft, None where its speed changes [rad]
-    static_safety : s_0, of the load P_0 whose heaviest ball bears the peak force (Z/5 of it) [1]
+    static_safety : s_0, of the load P_0 whose heaviest ball bears the peak force (Z/5 of it), that of `combined`
+        where it is higher [1]
     inner, outer : the rings
     speed : mean of the inner ring against the outer one in the run; 0 where there is no life [rad/s]
     why_no_life : reason why no standard gives a life; empty where one does
@@ -73,6 +75,7 @@ class BearingStrength(ShortRepr):
     beyond : limits of these numbers that it is beyond, sentences
     oscillation : where the rings swing, by hand; None where they turn, or do not move
     tilt : of the rings, by hand
+    combined : with axial force or tilt, where the scene has them
 
     Examples
     --------
@@ -107,6 +110,14 @@ class BearingStrength(ShortRepr):
     beyond: tuple[str, ...] = ()
     oscillation: Oscillation | None = None
     tilt: Tilt | None = None
+    combined: CombinedLoad | None = None
+
+    @property
+    def rated_lives(self) -> tuple[float | None, float | None]:
+        """L_10 and L_10r with axial force and tilt where the scene has them, else `basic_life` and `life` [turns]."""
+        if self.combined is None:
+            return self.basic_life, self.life
+        return self.combined.basic_life or self.basic_life, self.combined.life
 
     def hours(self, turns: float) -> float:
         """Hours that so many turns take.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.manifest import BearingInfo, DutyInfo
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.life.combined_load import combined_load
 from ballpass.runtime.life.limits import limits_of
 from ballpass.runtime.life.load_history import LoadHistory, load_history
 from ballpass.runtime.life.records import BearingStrength, DutyLife, RingStrength, StateStrength
@@ -115,7 +116,10 @@ def _bearing(
     powers, balls = history.powers[info.prefix], (ratings.inner_ball, ratings.outer_ball)
     turns = None if why else float(life.raceway_life(balls, powers, ratings.life))
     load = samples.equivalent_load(float(ratings.life.basic))
-    ratio, contamination, factor, modified = _modified(info, values, ratings, speed, turns)
+    tilt = _tilt(info, values, load)
+    combined = combined_load(info, values, ratings, samples, tilt.total, turns=not why)
+    found, heaviest = (turns, force) if combined is None else (combined.life, max(force, combined.peak_force))
+    ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
     inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
     strength = BearingStrength(
         name=info.name,
@@ -129,7 +133,7 @@ def _bearing(
         peak_time=peak.maximum_time,
         peak_ball=int(peak.maximum_ball or 0),
         peak_angle=None if timeline.is_free(manifest) else timeline.crank_angle(manifest, values, peak.maximum_time),
-        static_safety=static_safety(info.balls, float(ratings.static), force * nominal),
+        static_safety=static_safety(info.balls, float(ratings.static), heaviest * nominal),
         inner=inner,
         outer=outer,
         speed=speed,
@@ -141,13 +145,14 @@ def _bearing(
         contamination=contamination,
         factor=factor,
         modified_life=modified,
+        combined=combined,
     )
-    tilt = _tilt(info, values, load)
+    warned = (tilt.beyond, "" if combined is None else combined.beyond)
     return replace(
         strength,
         beyond=(
             *limits_of(info, moving, strength, history.fastest),
-            *filter(None, (tilt.beyond,)),
+            *filter(None, warned),
             *limits_of_fit(info, values),
         ),
         oscillation=_oscillation(info, values, ratings, samples, load, force) if why and turning else None,
@@ -305,9 +310,11 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         speed = sum(share * abs(bearing.speed) for share, (_, bearing) in zip(shares, lasting, strict=True))
         return total, total * 3600.0 * speed / TURN
 
-    lives = [bearing.life for _, bearing in lasting if bearing.life is not None]
-    spent, turns = together(lives)
-    basic = together([bearing.basic_life for _, bearing in lasting if bearing.basic_life is not None])
+    basics, lives = (
+        [each for each in kind if each is not None]
+        for kind in zip(*(bearing.rated_lives for _, bearing in lasting), strict=True)
+    )
+    (spent, turns), basic = together(lives), together(basics)
     first = lasting[0][1]
     films = [bearing.modified_life for _, bearing in lasting]
     modified = None if None in films else together([each for each in films if each is not None])

@@ -187,6 +187,8 @@ def _bearing_parts(bearing: BearingStrength, reliability: float) -> _Parts:
     ]
     if bearing.tilt is not None:
         parts.append(f"  {bearing.tilt.words}")
+    if bearing.combined is not None:
+        parts.append(f"  {bearing.combined.words}")
     if bearing.why_no_life:
         parts.append(f"  No rating life. {bearing.why_no_life}")
         return [*parts, f"  {bearing.oscillation.words}"] if bearing.oscillation is not None else parts
@@ -194,6 +196,11 @@ def _bearing_parts(bearing: BearingStrength, reliability: float) -> _Parts:
         f"basic L_10, equivalent load P {_force(bearing.equivalent_load)}": bearing.basic_life,
         "reference L_10r": bearing.life,
     }
+    if bearing.combined is not None:
+        if bearing.combined.basic_life is not None:
+            axial = f"basic L_10, P = X F_r + Y F_a {_force(bearing.combined.equivalent_load)}"
+            lives[axial] = bearing.combined.basic_life
+        lives["reference L_10r, axial force and tilt"] = bearing.combined.life
     if bearing.factor is not None:
         film = f"κ {bearing.viscosity_ratio:.3g}, e_C {bearing.contamination:.2g}"
         words = f"modified L_nmr, a_ISO {bearing.factor:.3g}, {film}"
@@ -206,7 +213,9 @@ def _verdict(bearing: BearingStrength, reliability: float) -> str:
     """What the numbers mean."""
     held = "bears its highest load" if bearing.static_safety >= 1.0 else "brinells at its highest load"
     verdict = f"It {held}: static safety s_0 {bearing.static_safety:.3g}."
-    shortest = bearing.life if bearing.modified_life is None else bearing.modified_life
+    _, shortest = bearing.rated_lives
+    if bearing.modified_life is not None:
+        shortest = bearing.modified_life
     if shortest is None:
         return verdict
     hours = RELIABILITY[reliability] * bearing.hours(shortest)

@@ -67,7 +67,7 @@ class LoadSamples:
 
     def equivalent_load(self, power: float) -> float:
         """P of ISO 281, mean of a power over the angle that the rings turn against each other, else over time [N]."""
-        turned = np.abs(_moved(self.in_outer) - _moved(self.in_inner))
+        turned = np.abs(passed_angle(self.in_outer) - passed_angle(self.in_inner))
         weight = turned if np.any(turned) else np.ones_like(turned)
         load = combined_load(self.resultant, self.axial, self.contact_angle, deep_groove=self.deep_groove)
         return float(np.average(load**power, weights=weight) ** (1.0 / power))
@@ -150,7 +150,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
     """
     force = samples.force
     count, balls = force.shape
-    moved = np.abs(_moved(angle))
+    moved = np.abs(passed_angle(angle))
     length = float(samples.time[-1] - samples.time[0]) * count / max(count - 1, 1)
     widest = float(contact.semi_axes(float(np.max(force)))[0]) if np.max(force) > 0.0 else 0.0
     across = np.linspace(0.0, widest, ACROSS)
@@ -167,7 +167,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
     return WearField(across=across, rate=rate * SECTORS / (TURN * length))
 
 
-def _moved(angle: Array) -> Array:
+def passed_angle(angle: Array) -> Array:
     """How far an angle moves behind each sample, by less than half a turn; behind the last as behind the one before."""
     moved = beside(np.diff(angle, append=angle[-1:]))  # angles come back after a turn
     if len(moved) > 1:

@@ -36,6 +36,12 @@ CONTAMINATION = {
     "very severe contamination": ((0.0, 0.0), (0.0, 0.0)),
 }
 
+#: F_a/(Z D_w²) [N/mm²] and e of deep groove ball bearings; ISO 281:2007, Table 3.
+AXIAL_LIMITS = (
+    (0.172, 0.345, 0.689, 1.03, 1.38, 2.07, 3.45, 5.17, 6.89),
+    (0.19, 0.22, 0.26, 0.28, 0.30, 0.34, 0.38, 0.42, 0.44),
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeFactor:
@@ -103,6 +109,17 @@ def axial_factors(angle: float, *, deep_groove: bool) -> tuple[float, float, flo
     else:
         test, reduction = 1.25, 1.0 - (0.4 if angle < np.radians(17.5) else 1.0 / 2.75) * np.sin(angle)
     return 1.0 - 0.4 * test / reduction, float(0.4 / (np.tan(angle) * reduction)), float(test * np.tan(angle))
+
+
+def table_angle(axial: float, balls: int, ball_diameter: float) -> float:
+    """Contact angle of which the e of the table of ISO 281 is, linear between its rows, constant beyond [rad].
+
+    Parameters
+    ----------
+    axial : F_a [N]
+    ball_diameter : D_w [m]
+    """
+    return float(np.arctan(np.interp(axial / (balls * (KILO * ball_diameter) ** 2), *AXIAL_LIMITS) / 1.05))
 
 
 def combined_load(radial: Any, axial: Any, angle: float, *, deep_groove: bool) -> Any:

@@ -44,8 +44,8 @@ class Tilt:
             return ""
         return (
             f"the rings are tilted by {self.total / ARCMIN:.3g} arcmin, and the clearance leaves "
-            f"{self.free / ARCMIN:.3g} arcmin free: balls at both sides are loaded by the tilt, which the model does "
-            "not have. Real lives are shorter. Take a thicker shaft, more clearance, or a self-aligning bearing."
+            f"{self.free / ARCMIN:.3g} arcmin free: balls at both sides are loaded by the tilt, which the motion does "
+            "not have. Real lives may be far shorter. Take a thicker shaft, more clearance, or a self-aligning bearing."
         )
 
 
