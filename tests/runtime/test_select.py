@@ -43,9 +43,27 @@ def test_a_candidate_is_the_scene_with_its_bearing(tmp_path: Path, monkeypatch: 
         assert (("life:" in row["lacks"]), ("s_0:" in row["lacks"])) == (short, weak)
 
 
+def test_axial_force_and_states_at_rest_count(tmp_path: Path) -> None:
+    """The life with the axial force, over a cycle in which the rotor rests for half of the time."""
+    text = (SCENES / "rotor.toml").read_text(encoding="utf-8")
+    text = text.replace('designation = "6204"', 'designation = "6204"\naxial_force = "500 N"')
+    text += '[duty.turning]\nshare = 0.5\n[duty.resting]\nshare = 0.5\nset.shaft.speed = "0 rpm"\n'
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    row = asked(str(tmp_path / "scene.toml"), "--designation", "6204", "--cycles", "4", "--transient", "2")["6204"]
+    report = load(generate(tmp_path / "scene.toml", tmp_path / "model")).life(4, transient=2)
+    (bearing,) = report.states[0].bearings
+    assert bearing.combined is not None
+    assert bearing.life is not None
+    assert bearing.combined.life is not None
+    assert row["hours"] == pytest.approx(2.0 * bearing.hours(bearing.combined.life), rel=1e-12)
+    assert row["hours"] < 0.1 * 2.0 * bearing.hours(bearing.life)
+    assert row["peak_force"] == pytest.approx(bearing.combined.peak_force, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("words", "allowed"),
     [
+        (("--set", "bearing.clearance=5 um"), "no designation gives"),
         (("--designation", "9999"), "ballpass bearings"),
         (("--bore", "1 mm:2 mm"), "ballpass bearings"),
         (("--bore", "20 kg"), "--bore"),

@@ -119,6 +119,11 @@ class BearingStrength(ShortRepr):
             return self.basic_life, self.life
         return self.combined.basic_life or self.basic_life, self.combined.life
 
+    @property
+    def reached(self) -> float | None:
+        """Life that 90 % of such bearings reach: L_nmr where the scene says oil and dirt, else L_10r [turns]."""
+        return self.rated_lives[1] if self.modified_life is None else self.modified_life
+
     def hours(self, turns: float) -> float:
         """Hours that so many turns take.
 

@@ -213,9 +213,7 @@ def _verdict(bearing: BearingStrength, reliability: float) -> str:
     """What the numbers mean."""
     held = "bears its highest load" if bearing.static_safety >= 1.0 else "brinells at its highest load"
     verdict = f"It {held}: static safety s_0 {bearing.static_safety:.3g}."
-    _, shortest = bearing.rated_lives
-    if bearing.modified_life is not None:
-        shortest = bearing.modified_life
+    shortest = bearing.reached
     if shortest is None:
         return verdict
     hours = RELIABILITY[reliability] * bearing.hours(shortest)

@@ -7,25 +7,25 @@ highest force, and what it lacks.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.show.progress import Progress
+from ballpass.runtime.show.progress import Progress, shown
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.designations import BearingType
     from ballpass.runtime.contract.manifest import BearingInfo
-    from ballpass.runtime.life.records import BearingStrength
+    from ballpass.runtime.life.text import LifeReport
 
 Of = Annotated[
     Sequence[str] | None,
@@ -108,32 +108,32 @@ class Selection(Reported):
         return tuple(one for one in self.candidates if not one.lacks)
 
     def _report(self) -> Report:
-        names = list(dict.fromkeys(name for one in self.candidates for name in one.of))
-        heads = ("bearing", "d", "D", "B", "life [h]", "s_0", "peak force [N]", *names, "lacks")
-        rows = [
-            (
-                one.designation,
-                *(f"{1e3 * size:g}" for size in (one.bore, one.outside_diameter, one.width)),
-                *("" if math.isnan(x) else rounded(x, 3) for x in (one.hours, one.static_safety, one.peak_force)),
-                *(rounded(one.of[name]) if name in one.of else "" for name in names),
-                one.lacks,
-            )
-            for one in self.candidates
-        ]
+        def cell(value: float) -> str:
+            return "" if math.isnan(value) else rounded(value, 3)
+
+        columns: dict[str, Callable[[Candidate], str]] = {
+            "bearing": lambda one: one.designation,
+            ">d": lambda one: f"{1e3 * one.bore:g}",
+            ">D": lambda one: f"{1e3 * one.outside_diameter:g}",
+            ">B": lambda one: f"{1e3 * one.width:g}",
+            ">life [h]": lambda one: cell(one.hours),
+            ">s_0": lambda one: cell(one.static_safety),
+            ">peak force [N]": lambda one: cell(one.peak_force),
+        }
+        for name in dict.fromkeys(name for one in self.candidates for name in one.of):
+            columns[f">{name}"] = lambda one, name=name: rounded(one.of[name]) if name in one.of else ""  # type: ignore[misc]
+        columns["~lacks"] = lambda one: one.lacks
         first = min(self.chosen, key=_room, default=None)
         words = "No bearing of these has all that is asked for."
         if first is not None:
-            words = (
-                f"{len(self.chosen)} of {len(rows)} have all that is asked for. {first.designation} takes least room."
-            )
+            words = f"{len(self.chosen)} of {len(self.candidates)} have all that is asked for. "
+            words += f"{first.designation} takes least room."
         return Report(
             title=f"{self.title}: bearings of the tables",
             parts=(
-                ReportTable(
-                    heads=heads,
-                    rows=rows,
-                    right=heads[1:-1],
-                    wrapped=heads[-1:],
+                ReportTable.of(
+                    self.candidates,
+                    columns,
                     caption="d, D, B in mm. Each bearing was run in the scene with the clearance of its group, and all "
                     "else as the scene has it, also the masses of rings.",
                 ),
@@ -167,13 +167,14 @@ def select(
     Parameters
     ----------
     scene : its file
-    parameters : overrides, SI; those of the bearing that is replaced are left out
+    parameters : overrides, SI
     progress : gets the part that is done
 
     Raises
     ------
     RequestError
-        No bearing of the scene has the name, no bearing of the tables the bore or the designation.
+        No bearing of the scene has the name, no bearing of the tables the bore or the designation, or a number of the
+        bearing that a designation gives is overridden.
     """
     from ballpass.derive import SceneError, generate, read_scene
     from ballpass.runtime.model import load_own
@@ -182,66 +183,70 @@ def select(
         raise RequestError(f"{scene} is a folder. Allowed: the scene file, whose bearing is replaced by others.")
     info = _place(model.manifest.bearings, bearing or "")
     kinds = list(_kinds(designations, bore))
-    kept = {name: value for name, value in parameters.items() if not name.startswith(f"{info.path}.")}
+    refused = [name for name in parameters if name.startswith(f"{info.path}.") and _is_replaced(name)]
+    if refused:
+        raise RequestError(
+            f"--set {', '.join(refused)}: bearings of the tables have their own. Allowed: numbers that no designation "
+            "gives, and a group of clearance in the scene."
+        )
     found = []
-    for done, kind in enumerate(kinds):
-        if callable(progress):
-            progress(done / len(kinds))
-        sizes: dict[str, Any] = {
-            "designation": kind.designation,
-            "bore": float(kind.bore) / 1e3,
-            "outside_diameter": float(kind.outside) / 1e3,
-            "width": float(kind.width) / 1e3,
-        }
-        try:
-            with_it = read_scene(scene, changes=_changes(info, kind), name=f"{model.manifest.scene}_candidate")
-            other = load_own(generate(with_it))
-            report = other.life(cycles, transient=transient, parameters=kept, rtol=rtol)
-            sizes["of"] = {
-                name: found.value
-                for name, found in (
-                    other.quantities(of, cycles, transient=transient, parameters=kept, rtol=rtol) if of else {}
-                ).items()
-            }
-        except SceneError as fault:
-            found.append(Candidate(**sizes, lacks=fault.faults[0].problem))
-        except SimulationError as fault:
-            found.append(Candidate(**sizes, lacks=str(fault).partition(". ")[0]))
-        else:
-            states = [next(one for one in state.bearings if one.name == info.name) for state in report.states]
-            over = [one.modified_hours or one.hours for one in report.duty if one.name == info.name]
-            hours = (over or [_hours(states[0])])[0]
-            found.append(_judged(sizes, states, math.nan if hours is None else hours, life, static_safety))
+    with shown("choosing", progress) as tell:
+        for done, kind in enumerate(kinds):
+            if tell is not None:
+                tell(done / len(kinds))
+            with_it = Candidate(
+                designation=kind.designation,
+                bore=float(kind.bore) / 1e3,
+                outside_diameter=float(kind.outside) / 1e3,
+                width=float(kind.width) / 1e3,
+            )
+            try:
+                changed = read_scene(scene, changes=_changes(info, kind), name=f"{model.manifest.scene}_candidate")
+                other = load_own(generate(changed))
+                report = other.life(cycles, transient=transient, parameters=parameters, rtol=rtol)
+                asked = (
+                    other.quantities(of, cycles, transient=transient, parameters=parameters, rtol=rtol) if of else {}
+                )
+            except SceneError as fault:
+                found.append(replace(with_it, lacks=fault.faults[0].problem))
+            except BallpassError as fault:  # of this bearing: options were refused before
+                found.append(replace(with_it, lacks=str(fault).partition(". ")[0]))
+            else:
+                with_it = replace(with_it, of={name: one.value for name, one in asked.items()})
+                found.append(_judged(with_it, report, info.name, life, static_safety))
     return Selection(
         title=model.manifest.title, candidates=tuple(sorted(found, key=lambda one: (one.bore, _room(one))))
     )
+
+
+def _is_replaced(name: str) -> bool:
+    return name.rpartition(".")[2] in {*SIZES, *GROOVES, "clearance"}
 
 
 def _room(one: Candidate) -> float:
     return one.outside_diameter**2 * one.width
 
 
-def _hours(bearing: BearingStrength) -> float | None:
-    turns = bearing.life if bearing.modified_life is None else bearing.modified_life
-    return None if turns is None else bearing.hours(turns)
-
-
-def _judged(
-    sizes: Mapping[str, Any], states: Sequence[BearingStrength], hours: float, life: float | None, safety: float
-) -> Candidate:
-    """What a bearing has, in the worst state of a duty cycle, and lacks."""
+def _judged(candidate: Candidate, report: LifeReport, name: str, life: float | None, safety: float) -> Candidate:
+    """What a bearing has, over a duty cycle and in its worst state, and lacks."""
+    states = [one for state in report.states for one in state.bearings if one.name == name]
+    if not states:
+        return replace(candidate, lacks="nothing turns in any state")
+    reached = states[0].reached
+    lives = [one.modified_hours or one.hours for one in report.duty if one.name == name]
+    (hours,) = lives or [None if reached is None else states[0].hours(reached)]
     least = min(one.static_safety for one in states)
     lacks = []
-    if life is not None and not hours >= life / 3600.0:
+    if life is not None and (hours is None or hours < life / 3600.0):
         why = next((one.why_no_life for one in states if one.why_no_life), "")
-        lacks.append(why or f"life: {rounded(hours, 3)} of {rounded(life / 3600.0, 3)} h")
+        lacks.append(why or f"life: {rounded(hours or 0.0, 3)} of {rounded(life / 3600.0, 3)} h")
     if least < safety:
         lacks.append(f"s_0: {rounded(least, 3)} of {rounded(safety, 3)}")
-    return Candidate(
-        **sizes,
-        hours=hours,
+    return replace(
+        candidate,
+        hours=math.nan if hours is None else hours,
         static_safety=least,
-        peak_force=max(one.peak_force for one in states),
+        peak_force=max(max(one.peak_force, one.combined.peak_force if one.combined else 0.0) for one in states),
         lacks="; ".join(lacks),
     )
 
