@@ -90,7 +90,7 @@ def test_states_of_a_duty_cycle_add_up_by_time(press: Model, monkeypatch: pytest
     # Miner over shares of the turns says the same
     turned = [state.share * abs(bearing.speed) for state, bearing in zip(states[:2], single, strict=True)]
     shares = [each / sum(turned) for each in turned]
-    by_turns = life.miner(shares, [bearing.life for bearing in single])
+    by_turns = 1.0 / sum(share / (bearing.life or 0.0) for share, bearing in zip(shares, single, strict=True))
     assert found.turns == pytest.approx(by_turns, rel=1e-12)
 
 

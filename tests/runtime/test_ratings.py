@@ -27,7 +27,6 @@ def test_static_factors_by_exact_contact_are_those_of_iso_76() -> None:
     printed = {0.05: 15.7, 0.09: 16.5, 0.23: 13.2, 0.24: 13.0, 0.30: 11.6}
     for gamma, factor in printed.items():
         assert load_ratings.static_factor(gamma) == pytest.approx(factor, abs=0.05)
-        assert load_ratings.tabulated_static_factor(gamma) == pytest.approx(factor, abs=1e-12)
     # the whole table is printed to 0.1: no row is off by more than that rounding and 0.05 %
     rows = np.array(load_ratings.GAMMA[1:])
     chain = load_ratings.static_factor(rows)
@@ -195,14 +194,6 @@ def test_cubic_means_have_their_closed_forms(load: Callable[[float], float], mea
     assert life.mean_load(loads, 3.0) == pytest.approx(mean, rel=1e-6)
     shares = np.full(20000, 1 / 20000)
     assert life.mean_load(loads, 3.0, shares) == pytest.approx(mean, rel=1e-6)
-
-
-def test_miner_adds_damages_and_is_the_life_of_the_cubic_mean() -> None:
-    shares, loads = (0.2, 0.5, 0.3), (3000.0, 1000.0, 500.0)
-    lives = [life.basic_life(13.5e3, load) for load in loads]
-    assert life.miner(shares, lives) == pytest.approx(1 / (0.2 / lives[0] + 0.5 / lives[1] + 0.3 / lives[2]))
-    mean = life.mean_load(loads, 3.0, shares)
-    assert life.miner(shares, lives) == pytest.approx(life.basic_life(13.5e3, mean), rel=1e-12)
 
 
 def test_pure_rolling_lines_balance_friction() -> None:

@@ -6,7 +6,7 @@ or each place of a raceway.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -296,8 +296,3 @@ def raceway_life(ratings: tuple[Any, Any], powers: Any, of: ElementLife = BALLS)
 def equivalent_load(dynamic_rating: Any, life: Any, of: ElementLife = BALLS) -> Any:
     """Load of constant size whose L_10 is this life [N]; ISO 16281:2008."""
     return dynamic_rating * (MILLION / life) ** float(1 / of.basic)
-
-
-def miner(shares: Iterable[Any], lives: Iterable[Any]) -> Any:
-    """Life 1/Σ(U_k/L_k) of a duty cycle, U_k the shares of its turns; Palmgren 1924, Miner 1945."""
-    return 1.0 / sum(share / life for share, life in zip(shares, lives, strict=True))

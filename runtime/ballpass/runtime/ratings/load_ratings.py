@@ -55,11 +55,6 @@ def static_factor(gamma: Any, grooves: tuple[Any, Any] = REFERENCE_GROOVES, stee
     return smaller(*loads) / 5.0 * 1e-6
 
 
-def tabulated_static_factor(gamma: Any) -> Any:
-    """f_0 of ISO 76, Table 1, linear between its rows; γ up to 0.4 [N/mm²]."""
-    return interpolated(gamma, GAMMA, STATIC_FACTORS)
-
-
 def static_rating(
     balls: Any, ball_diameter: Any, pitch_diameter: Any, grooves: Any = REFERENCE_GROOVES, cosine: Any = 1.0
 ) -> Any:
