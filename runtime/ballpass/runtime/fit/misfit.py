@@ -25,7 +25,7 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.nodes import fixed_nodes
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.quantity.track import ChannelValues, Motion
+from ballpass.runtime.quantity.track import ChannelValues, FollowedRun
 from ballpass.runtime.request.locating import kinks_with_derivatives
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
@@ -312,7 +312,7 @@ class Misfit:
         moving[:, -1] = 1.0
         held = np.clip(np.searchsorted(segments.times, t, side="right") - 1, 0, len(segments.times) - 2)
         nodes = replace(fixed_nodes(t, held, held), slope=moving)
-        motion = Motion(run=run, segments=segments, still=not model.states)
+        motion = FollowedRun(run=run, segments=segments, still=not model.states)
         track = motion.along(nodes, chain, SENSITIVITY * self._rtol)
         signals = ChannelValues(model, list(trial.signals)).along(track, numbers, chain)
         found: dict[str, Arrays] = {}

@@ -21,7 +21,7 @@ from ballpass.runtime.contract.defaults import BRANCH_RTOL
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.motion.shooting import Shooting
 from ballpass.runtime.native.reduction_rows import DEFLECTION
-from ballpass.runtime.quantity.track import ChannelValues, Motion
+from ballpass.runtime.quantity.track import ChannelValues, FollowedRun
 from ballpass.runtime.request.ball_angles import ball_angles
 from ballpass.runtime.request.locating import kinks_with_derivatives
 from ballpass.runtime.request.request import Request
@@ -169,7 +169,7 @@ def _deflections(
     corners = np.unique([run.begin, *kept[:, 0].tolist(), run.end])
     between = corners[:-1, None] + np.diff(corners)[:, None] * np.arange(PARTS) / PARTS
     t = np.append(between.ravel(), run.end)
-    motion = Motion(run=run, segments=segments_of(run), kept=kept)
+    motion = FollowedRun(run=run, segments=segments_of(run), kept=kept)
     seen = channels.along(motion.along(motion.nodes_at(t)), numbers)
     return t, *(seen[name].value for name in channels.channels)
 

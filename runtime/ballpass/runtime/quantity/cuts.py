@@ -25,7 +25,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.nodes import APART, Cause, Cuts, scheduled_cuts
 from ballpass.runtime.quantity.panels import GAUSS, cut_at, nodes_of, whole_panels
-from ballpass.runtime.quantity.track import WINDOWS, ChannelValues, Motion, Track
+from ballpass.runtime.quantity.track import WINDOWS, ChannelValues, FollowedRun, Track
 from ballpass.runtime.request.request import Request, check_memory
 from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.run.directions import Chain
@@ -171,7 +171,7 @@ class Passages:
     before: float
 
 
-def find_passages(motion: Motion, cuts: Cuts, track: Track, angles: Angles) -> Passages:
+def find_passages(motion: FollowedRun, cuts: Cuts, track: Track, angles: Angles) -> Passages:
     """Passages of angles along a track, apart from cuts."""
     run = motion.run
     beyond, _ = angles.past(track, run.numbers)
@@ -195,7 +195,7 @@ def find_passages(motion: Motion, cuts: Cuts, track: Track, angles: Angles) -> P
 
 
 def moving_cuts(
-    motion: Motion, cuts: Cuts, angles: Mapping[Cause, Angles], chain: Chain, sensitivity_rtol: float
+    motion: FollowedRun, cuts: Cuts, angles: Mapping[Cause, Angles], chain: Chain, sensitivity_rtol: float
 ) -> tuple[Cuts, NDArray[np.bool_]]:
     """Cuts with their derivatives along directions, and directions in which the jump of an angle leaves its cut.
 
@@ -308,7 +308,7 @@ def _passages_of(run: Run) -> Passages:
     kept, run = steps_of(run), replace(run, progress=None)
     ends, count = kept[:, 0], 16 * len(run.model.states)
     check_memory("Edges along a run of", len(GAUSS) * len(ends), count, "Run fewer cycles.")
-    motion = Motion(run=run, segments=segments_of(run), kept=kept, still=False)
+    motion = FollowedRun(run=run, segments=segments_of(run), kept=kept, still=False)
     cuts = scheduled_cuts(run, motion.segments)
     panels = cut_at(whole_panels(cuts), cuts, ends, np.zeros(len(ends), dtype=bool))
     return find_passages(motion, cuts, motion.along(nodes_of(panels, cuts)), window_angles(run.model))

@@ -46,7 +46,7 @@ from ballpass.runtime.quantity.panels import (
 )
 from ballpass.runtime.quantity.records import Kind, Mark, Quantity, View
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.quantity.track import ChannelValues, Motion, Signal, Track, depends
+from ballpass.runtime.quantity.track import ChannelValues, FollowedRun, Signal, Track, depends
 from ballpass.runtime.request.locating import LOCATED, stepper_for
 from ballpass.runtime.request.request import check_memory
 from ballpass.runtime.request.resolve import Run
@@ -92,7 +92,7 @@ class Layout:
     """
 
     items: tuple[Quantity, ...]
-    motion: Motion
+    motion: FollowedRun
     causes: frozenset[Cause]
     cuts: Cuts
     panels: Panels
@@ -159,7 +159,7 @@ class NodeLayer:
             groups[self.is_still(item), causes, item.channel if Cause.JUMP in causes else ""].append(item)
         found: list[Layout] = []
         for (still, causes, _), items in groups.items():
-            motion = Motion(run=run, segments=segments, kept=kept, still=still)
+            motion = FollowedRun(run=run, segments=segments, kept=kept, still=still)
             here = self._first(motion, causes, tuple(items), scheduled_cuts(run, segments))
             for cause, angles in self.angles_of(here).items():
                 passed = find_passages(motion, here.cuts, here.track, angles)
@@ -182,7 +182,7 @@ class NodeLayer:
             found[Cause.WINDOW] = self._windows
         return found
 
-    def _first(self, motion: Motion, causes: frozenset[Cause], items: tuple[Quantity, ...], cuts: Cuts) -> Layout:
+    def _first(self, motion: FollowedRun, causes: frozenset[Cause], items: tuple[Quantity, ...], cuts: Cuts) -> Layout:
         """Moments; else panels that are steps, and the run along their nodes."""
         panels = self._panels(motion, cuts, causes) if causes else whole_panels(cuts)
         nodes, marks = (nodes_of(panels, cuts), {}) if causes else moments(motion.run, cuts, items)
@@ -199,7 +199,7 @@ class NodeLayer:
             marks={key: [mark] for key, mark in marks.items()},
         )
 
-    def _panels(self, motion: Motion, cuts: Cuts, causes: frozenset[Cause]) -> Panels:
+    def _panels(self, motion: FollowedRun, cuts: Cuts, causes: frozenset[Cause]) -> Panels:
         """Panels that are steps; of what follows from time alone even ones."""
         mechanism, manifest, run = self.model.manifest.mechanism, self.model.manifest, motion.run
         angle = "" if mechanism is None else mechanism.angle

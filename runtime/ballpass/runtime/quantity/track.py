@@ -87,7 +87,7 @@ class Signal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Motion:
+class FollowedRun:
     """A run, to be followed along nodes.
 
     Attributes
