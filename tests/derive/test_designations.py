@@ -20,6 +20,7 @@ from ballpass.derive.scene.records import Scene
 from ballpass.runtime.app.commands.ranges import read_ranges
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.ratings import load_ratings, of_bearing
+from ballpass.runtime.ratings.branches import interpolated
 
 TYPES = {name: kind for name, kind in bearing_types().items() if kind.element == "ball"}
 #: Bearings that the table's balls miss by more than 2 %.  Of 6302 both print f_0 = 12.3, not 12.1: its pitch circle is
@@ -123,7 +124,7 @@ def test_balls_of_the_table_are_the_best_ones_of_their_rule() -> None:
         size = sizes[(sizes > 0.2 * room) & (sizes < 0.9 * room)]
         balls, size = np.meshgrid(np.arange(5, 20), size, indexing="ij")
         dynamic = load_ratings.dynamic_rating(balls, size / 1e3, pitch / 1e3)
-        static = load_ratings.tabulated_static_factor(size / pitch) * balls * size**2
+        static = interpolated(size / pitch, load_ratings.GAMMA, load_ratings.STATIC_FACTORS) * balls * size**2
         off = np.maximum(abs(dynamic / printed.dynamic - 1), abs(static / printed.static - 1))
         off[balls * size > 0.96 * np.pi * pitch] = np.inf
         best = np.unravel_index(np.argmin(off), off.shape)
