@@ -2,8 +2,9 @@
 
 In: a checked scene.  Out: points with their velocities as linear forms, rows of the constraints, poses that close.
 
-Coordinates are x, y of the centre of mass and the angle of every body, and x, y of every outer ring on an elastic
-housing.  Nothing of the derivation is used but the records that hold the scene.
+Coordinates are x, y of the centre of mass and the angle of every body, x, y of every outer ring on an elastic housing,
+and the slopes of the driven body's axis where it tilts.  Nothing of the derivation is used but the records that hold
+the scene.
 """
 
 from __future__ import annotations
@@ -64,9 +65,12 @@ class Absolute:
         self.values = {q.path: q.value for q in scene.quantities} | dict(changes)
         self.bodies = [b.name for b in self.mechanism.bodies]
         self.elastic = [b.name for b in self.bearings if b.outer is not None]
-        self.size = 3 * len(self.bodies) + 2 * len(self.elastic)
+        self.tilt = 3 * len(self.bodies) + 2 * len(self.elastic)
+        on_shaft = [b for b in self.bearings if b.tilts]
+        self.size = self.tilt + (2 if on_shaft else 0)
         self.in_play = {b.joint: [other for other in self.bearings if other.joint == b.joint] for b in self.bearings}
         self.first = [several[0] for several in self.in_play.values()]  # the others' inner rings move alike
+        self.first = [b for b in self.bearings if (b in on_shaft[:2] if b.tilts else b in self.first)]
         self.speed = self.values[self.mechanism.driver.speed.path]
         self.start = self.values[self.mechanism.driver.start_angle.path]
         joint = self.mechanism.joint(self.mechanism.driver.joint)
@@ -108,7 +112,13 @@ class Absolute:
         if body == FRAME:
             return self.vector(next(p.position for p in self.mechanism.frame_points if p.name == point))
         record = self.mechanism.body(body)
-        return self.vector(record.point(point)) - self.vector(record.center_of_mass)
+        arm = self.vector(record.point(point)) - self.vector(record.center_of_mass)
+        return np.array([*arm, self.along_shaft(body, point)])
+
+    def along_shaft(self, body: str, point: str) -> float:
+        """Place of a point of a body that tilts, from its centre of mass."""
+        places = dict(self.mechanism.body(body).positions)
+        return self.value(places.get(point)) - self.value(places.get("center_of_mass"))
 
     def row(self, body: str) -> Array:
         """Rate of a body's angle as a linear form."""
@@ -124,11 +134,15 @@ class Absolute:
         if body == FRAME:
             return Place(arm, np.zeros(2), np.zeros((2, self.size)), np.zeros(2))
         k = 3 * self.bodies.index(body)
-        turned = rotation(q[k + 2]) @ arm
+        turned = rotation(q[k + 2]) @ arm[:2]
         jacobian = np.zeros((2, self.size))
         jacobian[:, k : k + 2] = np.eye(2)
         jacobian[:, k + 2] = QUARTER @ turned
-        return Place(q[k : k + 2] + turned, jacobian @ v, jacobian, -turned * v[k + 2] ** 2)
+        moved = q[k : k + 2] + turned
+        if body == self.driven and self.size > self.tilt:
+            jacobian[:, self.tilt :] = arm[2] * np.eye(2)
+            moved = moved + arm[2] * q[self.tilt :]
+        return Place(moved, jacobian @ v, jacobian, -turned * v[k + 2] ** 2)
 
     def at(self, joint: Joint, body: str, q: Array, v: Array) -> Place:
         return self.place(body, self.arm(body, joint.point(body)), q, v)
@@ -183,6 +197,13 @@ class Absolute:
         """Points of a bearing: of the inner ring's body, of the housing's body, and the centre of the outer ring."""
         joint = self.mechanism.joint(bearing.joint or "")
         inner, housing = (self.at(joint, body, q, v) for body in (bearing.inner_body, joint.other(bearing.inner_body)))
+        if bearing.tilts:
+            arm = self.arm(self.driven, joint.point(self.driven)).copy()
+            arm[2] += self.value(bearing.position) - self.value(
+                dict(self.mechanism.body(self.driven).positions).get(joint.point(self.driven))
+            )
+            inner = self.place(self.driven, arm, q, v)
+            housing.position = housing.position + (0.0 if bearing.offset is None else self.vector(bearing.offset))
         return inner, housing, housing if bearing.outer is None else self.ring(bearing.name, q, v)
 
     def _guessed(self, guess: Mapping[tuple[str, str], tuple[float, float]]) -> Array:
@@ -194,9 +215,10 @@ class Absolute:
                 ((a, b) for a in known for b in known), key=lambda pair: float(np.linalg.norm(pair[1][0] - pair[0][0]))
             )
             local, world = other - arm, there - at
+            local = local[:2]
             if np.linalg.norm(local) > 0.0:
                 q[3 * k + 2] = math.atan2(world[1], world[0]) - math.atan2(local[1], local[0])
-            q[3 * k : 3 * k + 2] = at - rotation(q[3 * k + 2]) @ arm
+            q[3 * k : 3 * k + 2] = at - rotation(q[3 * k + 2]) @ arm[:2]
         q[3 * self.bodies.index(self.driven) + 2] = self.start
         return q
 

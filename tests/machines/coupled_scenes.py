@@ -76,6 +76,8 @@ def bearing(
     effects: str = "",
     angle: str = "",
     beside: str = "",
+    position: str = "",
+    offset: str = "",
 ) -> str:
     """Tables of a bearing coupled two-way at a joint; `inner` carries the inner ring; no stiffness: from geometry.
 
@@ -96,6 +98,8 @@ clearance = "{clearance}"
 ball_angle = "17 deg"
 {f'contact_angle = "{angle}"' if angle else ""}
 {"" if count is None else f"count = {count}"}
+{f'position = "{position}"' if position else ""}
+{f"offset = {offset}" if offset else ""}
 [{name}.contact]
 {HERTZ if stiffness is None else f'stiffness = "{stiffness!r} N/m^1.5"'}
 [{name}.damping]

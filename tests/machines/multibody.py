@@ -222,13 +222,15 @@ class Multibody(Absolute):
         for bearing in self.bearings:
             if bearing.outer is not None:
                 out += [self.count(bearing) * self.value(bearing.outer.mass)] * 2
+        if self.size > self.tilt:
+            out += [self.value(self.mechanism.body(self.driven).transverse_inertia)] * 2
         return np.array(out)
 
     def weight(self) -> Array:
         along = np.zeros(self.size)
         for k in range(0, 3 * len(self.bodies), 3):
             along[k : k + 2] = self.gravity
-        for k in range(3 * len(self.bodies), self.size, 2):
+        for k in range(3 * len(self.bodies), self.tilt, 2):
             along[k : k + 2] = self.gravity
         return self.masses() * along
 
@@ -335,6 +337,9 @@ class Multibody(Absolute):
                 pushed -= self.count(bearing) * force * gradient
             if bearing.outer is not None:
                 pushed += self.housing_force(bearing, q, v)[1]
+        if self.size > self.tilt:  # J_t s'' = M + gyroscopic moments
+            turning = self.value(self.mechanism.body(self.driven).inertia) * rate
+            pushed[self.tilt :] += turning * QUARTER @ v[self.tilt :]
         if self.motor is not None:
             pushed += self.torque(rate) * self.row(self.driven)
             rows, rest = rows[:-1], rest[:-1]  # the driver's comes last

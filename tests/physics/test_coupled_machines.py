@@ -72,6 +72,14 @@ table = { time = ["0.1 s", "0.5 s", "1 s"], speed = ["100 rpm", "600 rpm", "-300
 """
 
 
+#: The crank tilts; its pin and its centre of mass have places of their own.
+TILTING = (
+    "[mechanism.bodies.crank]\n",
+    '[mechanism.bodies.crank]\ntransverse_inertia = "900 kg*mm^2"\n'
+    'positions = { B = "-12 mm", center_of_mass = "20 mm" }\n',
+)
+
+
 def driven_by(drive: str) -> tuple[tuple[str, str], ...]:
     return ((FRAME_POINTS, drive + FRAME_POINTS),)
 
@@ -114,6 +122,21 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         "punching_press",
         (*OFF_CENTRE, (SPEED, RUN_UP)),
         (bearing("A", elastic=True, effects=EFFECTS + SPALLS), bearing("B", "rod", effects=EFFECTS)),
+    ),
+    "press, crank that tilts in three bearings": (
+        "punching_press",
+        (TILTING, *OFF_CENTRE),
+        (
+            bearing("A", elastic=True, count=2, position="30 mm"),
+            bearing("A", position="90 mm", beside="second_", effects=EFFECTS),
+            bearing("A", elastic=True, position="60 mm", beside="third_", offset='["3 um", "-4 um"]', angle="15 deg"),
+            bearing("B", "rod"),
+        ),
+    ),
+    "press, overhung crank that tilts, motor": (
+        "punching_press",
+        (TILTING, *OFF_CENTRE, *driven_by(MOTOR)),
+        (bearing("A", position="40 mm"), bearing("A", elastic=True, position="100 mm", beside="second_")),
     ),
     "press, effects, motor": (
         "punching_press",

@@ -175,15 +175,14 @@ def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | No
     ball, names, c = model.ball, model.names, model.coordinates
     of = f" of {bearing.name}" if bearing.name else ""
     count = _count(bearing)
-    place, speed = ((c[0].position, c[1].position), (c[0].velocity, c[1].velocity))
-    apart, parting = place, speed
+    speed = c[0].velocity, c[1].velocity
+    one_way = bearing.coupling == "one-way"
     rows: list[Words] = []
     if bearing.outer is not None:
         stiffness, damping = symbol_of(bearing.outer.stiffness), symbol_of(bearing.outer.damping)
         out, moving = (c[2].position, c[3].position), (c[2].velocity, c[3].velocity)
-        apart, parting = subtract(place, out), subtract(speed, moving)
         # in a linkage with play the damper turns with the housing
-        seen = subtract(moving, scale(turning, quarter_turn(out))) if load is None else moving
+        seen = moving if one_way else subtract(moving, scale(turning, quarter_turn(out)))
         loss = count * damping * dot(seen, seen)
         spring = -count * stiffness * dot(out, moving)
         rows = [
@@ -198,15 +197,16 @@ def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | No
         ]
     force = ball.ring_force  # of the inner ring on the balls
     # where rings are loaded one-way the cage's moments have no effect
-    moment = cross(apart, force)
-    power = count * ((moment * ball.cage.rate if load is None else sp.S.Zero) - dot(force, parting))
-    if load is None and ball.cage.ring_rate is not None:
+    moment = cross(model.apart, force)
+    power = count * ((sp.S.Zero if one_way else moment * ball.cage.rate) - dot(force, model.parting))
+    if not one_way and ball.cage.ring_rate is not None:
         power += count * sum(total.symbol for total in ball.sums[2:]) * ball.cage.ring_rate
     rows.append(("cage.moment", count * moment, "N*m", f"Moment of the rings on the cage{of}, counter-clockwise"))
     rows.append(("contact.power", power, "W", names.words("Power of all ball forces") + of))
     if load is not None:
         rows.append(("load.power", dot(load, speed), "W", f"Power of the load on the inner ring{of}"))
-        masses = [(names.constant("m_ei"), speed)]
+    if one_way:
+        masses = [(names.constant("m_ei"), speed)] if load is not None else []  # else of the shaft that tilts
         if bearing.outer is not None:
             masses.append((symbol_of(bearing.outer.mass), moving))
         energy = sp.Add(*(mass * dot(v, v) for mass, v in masses)) / 2

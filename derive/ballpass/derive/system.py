@@ -25,8 +25,9 @@ from ballpass.derive.bearing.equations import (
     ring_motion,
 )
 from ballpass.derive.bearing.equivalent_mass import inner_mass
-from ballpass.derive.bearing.ring_load import RingLoad, lever_of, load_on, own_loads
-from ballpass.derive.bearing.two_way import Coupled, carriers_of, couple, play_of
+from ballpass.derive.bearing.rigid_shaft import RigidShaft, rigid_shaft
+from ballpass.derive.bearing.ring_load import RingLoad, lever_of, load_on, load_on_shaft, own_loads
+from ballpass.derive.bearing.two_way import Coupled, carriers_of, couple, on_tilting_shaft, play_of, ring
 from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import NO_FORCES, Forces, derive_forces
@@ -187,6 +188,9 @@ class _Parts:
     own : what these loads need
     motions : of rings loaded one-way, which moves nothing else
     coupled : what bearings coupled two-way add to the linkage
+    axis : of a shaft that tilts in its bearings; None where it does not
+    on_axis : what that and its bearings add where they are loaded one-way
+    shaft_load : on it, then
     """
 
     scene: Scene
@@ -201,6 +205,9 @@ class _Parts:
     loads: tuple[Pair | None, ...]
     motions: tuple[RingMotion, ...]
     coupled: tuple[Coupled, ...]
+    axis: RigidShaft | None
+    on_axis: tuple[Coupled, ...]
+    shaft_load: RingLoad | None
 
     @property
     def swings(self) -> tuple[Swing, ...]:
@@ -218,6 +225,7 @@ class _Parts:
         """Ordered, without those that reactions, loads on rings and equations of motion add."""
         return (
             *self.drive.definitions,
+            *(() if self.axis is None else self.axis.definitions),
             *(() if self.linkage is None else self.linkage.definitions),
             *self.forces.definitions,
             *(d for swing in self.swings for d in swing.definitions),
@@ -242,16 +250,17 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
     mechanism, bearings, drive = scene.mechanism, scene.bearings, drive_of(scene)
     masses: dict[str, sp.Expr] = {}
     for bearing in bearings:
-        if bearing.coupling == "one-way":
+        if bearing.coupling == "one-way" and not bearing.tilts:
             with _noted(errors):
                 masses[bearing.name] = inner_mass(bearing, mechanism)
     linkage, forces, reactions = None, NO_FORCES, None
+    axis = rigid_shaft(bearings, scene.shaft, mechanism)
     if mechanism is None:
         turning = with_driver(drive)
         on_shaft = (STILL, turning) if scene.shaft is not None and scene.shaft.ring == "outer" else (turning, STILL)
         rings = [on_shaft] * len(bearings)
     else:
-        linked = _linked(scene, mechanism, drive, errors)
+        linked = _linked(scene, mechanism, drive, axis, errors)
         if linked is None:
             return None
         linkage, forces = linked
@@ -267,18 +276,31 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
             for bearing, model in zip(bearings, models, strict=True)
             if bearing.coupling == "two-way"
         ]
+        if axis is not None and scene.coupled:
+            coupled.append(Coupled(inertias=axis.tilting, efforts=axis.gyroscopic(drive.speed)))
         applied = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
         with _noted(errors):
             reactions = derive_reactions(linkage, applied, _moments(scene))
-    massless = any(bearing.coupling == "one-way" and bearing.name not in masses for bearing in bearings)
+    alone = [bearing for bearing in bearings if bearing.coupling == "one-way" and not bearing.tilts]
+    massless = any(bearing.name not in masses for bearing in alone)
     if massless or (linkage is not None and reactions is None):
         return None
     own = own_loads(scene, drive)
     levers = [lever_of(bearing, bearings) for bearing in bearings]
     own = replace(
-        own, constants=(*own.constants, *(d for lever in levers if lever is not None for d in lever.constants))
+        own,
+        constants=(
+            *own.constants,
+            *(d for lever in levers if lever is not None for d in lever.constants),
+            *(() if axis is None else axis.constants),
+        ),
     )
     loads = [load_on(bearing, own, linkage, reactions, lever) for bearing, lever in zip(bearings, levers, strict=True)]
+    shaft_load, on_axis = None, list[Coupled]()
+    if axis is not None and not scene.coupled:
+        shaft_load = load_on_shaft(own, linkage, reactions)
+        on_axis = [on_tilting_shaft(bearing, model) for bearing, model in zip(bearings, models, strict=True)]
+        on_axis.append(axis.loaded(shaft_load, rings[0][0].rate))
     return _Parts(
         scene=scene,
         drive=drive,
@@ -296,11 +318,14 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
             if load is not None
         ),
         coupled=tuple(coupled),
+        axis=axis,
+        on_axis=tuple(on_axis),
+        shaft_load=shaft_load,
     )
 
 
 def _linked(
-    scene: Scene, mechanism: Mechanism, drive: Drive, errors: list[SceneError]
+    scene: Scene, mechanism: Mechanism, drive: Drive, axis: RigidShaft | None, errors: list[SceneError]
 ) -> tuple[Linkage, Forces] | None:
     """The linkage and its loads; None, with the faults noted."""
     linkage, forces = None, None
@@ -309,11 +334,13 @@ def _linked(
     for bearing in scene.bearings:
         if bearing.coupling == "two-way":
             joint = mechanism.joint(bearing.joint or "")
-            play[joint.name] = play_of(bearing, joint, ring_coordinates(bearing))
+            inner = axis.reference if axis is not None and bearing.tilts else ring(ring_coordinates(bearing), 0)
+            play[joint.name] = play_of(bearing, joint, inner)
             # of several side by side the least play is all that the joint has
             reach[joint.name] = min(max(bearing.clearance.value, 0.0) / 2.0, reach.get(joint.name, math.inf))
     with _noted(errors):
-        linkage = derive_linkage(mechanism, drive, play)
+        slope = axis.slope if axis is not None and scene.coupled else None
+        linkage = derive_linkage(mechanism, drive, play, slope)
         with _noted(errors):
             forces = derive_forces(linkage)
         with _noted(errors):
@@ -333,14 +360,15 @@ def _moments(scene: Scene) -> frozenset[str]:
 def _motion(parts: _Parts) -> EquationsOfMotion:
     """Equations of motion of all that moves with the linkage: rings in its joints, a driver that a torque turns."""
     linkage, drive = parts.linkage, parts.drive
-    rings = (c for b in parts.scene.bearings if b.coupling == "two-way" for c in own_coordinates(b))
+    rings = (c for b in parts.scene.bearings if b.coupling == "two-way" or b.tilts for c in own_coordinates(b))
     # the heaviest last: M is factored in this order, without pivoting
     coordinates = (*rings, *(() if drive.coordinate is None else (drive.coordinate,)))
     efforts: tuple[Effort, ...] = ()
     if linkage is not None:
         efforts = (*weights_of(linkage), *work_of_drive(drive), *work_of(parts.forces.loads, linkage))
-    efforts += tuple(effort for part in parts.coupled for effort in part.efforts)
-    return LinearForms(parts.definitions, coordinates).motion(parts.inertias, efforts)
+    efforts += tuple(effort for part in (*parts.coupled, *parts.on_axis) for effort in part.efforts)
+    inertias = (*parts.inertias, *(inertia for part in parts.on_axis for inertia in part.inertias))
+    return LinearForms(parts.definitions, coordinates).motion(inertias, efforts)
 
 
 def _quantities(parts: _Parts) -> list[Output]:
@@ -359,6 +387,8 @@ def _requested(parts: _Parts) -> list[Output]:
         loads = parts.forces.of_each
         found += power_outputs(linkage, reactions, loads=loads, inertias=parts.inertias, weights=parts.weights)
     found += parts.forces.requested
+    if parts.axis is not None:
+        found += parts.axis.outputs(parts.shaft_load)
     rows = zip(parts.scene.bearings, parts.models, parts.loads, parts.rings, strict=True)
     for bearing, model, load, (_, housing) in rows:
         found += [*ring_outputs(model), *contact_outputs(bearing, model)]

@@ -23,7 +23,7 @@ from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, components, names_of, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
@@ -72,12 +72,17 @@ class BallRelations:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingModel:
-    """Contact between the rings of one bearing, over coordinates of the rings."""
+    """Contact between the rings of one bearing, over coordinates of the rings.
+
+    `apart` is from the centre of the outer ring to that of the inner one [m], `parting` its rate.
+    """
 
     names: Names
     noun: str  # of an element
     constants: tuple[Definition, ...]
     coordinates: tuple[Coordinate, ...]
+    apart: Pair
+    parting: Pair
     ball: BallRelations
     laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
 
@@ -104,12 +109,19 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     if coefficient != 0:
         constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
     coordinates = ring_coordinates(bearing)
-    ball, parts = _ball(bearing, names, coordinates, cage)
+    off = (sp.S.Zero, sp.S.Zero) if bearing.offset is None else components(bearing.offset)
+    # a fixed outer ring has no coordinates
+    sides = [[*zip(coordinates[axis::2], (1, -1), strict=False)] for axis in (0, 1)]
+    apart = tuple(sum((s * c.position for c, s in side), start=-e) for side, e in zip(sides, off, strict=True))
+    parting = tuple(sum((s * c.velocity for c, s in side), start=sp.S.Zero) for side in sides)
+    ball, parts = _ball(bearing, names, coordinates, cage, (apart[0], apart[1]))
     return BearingModel(
         names=names,
         noun=ELEMENTS[bearing.element].noun,
         constants=tuple(constants),
         coordinates=coordinates,
+        apart=(apart[0], apart[1]),
+        parting=(parting[0], parting[1]),
         ball=ball,
         laws=tuple(
             (name, smoothness_of(part, ball.deflection, ball.deflection_rate))
@@ -121,7 +133,8 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
 def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
     """Centres of the rings: of the frame's axes, from where they are unloaded.
 
-    The inner ring of a bearing beside another one has the coordinates of that.
+    The inner ring of a bearing beside another one has the coordinates of that; on a shaft that tilts that of a third
+    bearing follows from those of the first two.
     """
     own = names_of(bearing)
     first = Names(prefix=f"{bearing.beside}.", path=f"bearings.{bearing.beside}") if bearing.beside else own
@@ -138,7 +151,7 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
             latex=names.latex(f"{axis}_{letter}"),
             description=f"of the centre of the {words}{of} along {axis}",
             group=first.path,
-            partner=f"{partners[ring]}.{axis}" if bearing.outer else "",
+            partner=f"{partners[ring]}.{axis}" if bearing.outer and not bearing.has_axis else "",
         )
         for ring, words, letter, names in rings
         for axis in "xy"
@@ -146,24 +159,19 @@ def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
 
 
 def own_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
-    """Those of its rings that no bearing before it has."""
-    return ring_coordinates(bearing)[2 if bearing.beside else 0 :]
+    """Those of its rings that do not follow from bearings before it."""
+    return ring_coordinates(bearing)[2 if bearing.beside or bearing.has_axis else 0 :]
 
 
 def _ball(
-    bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage: Cage
+    bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage: Cage, apart: Pair
 ) -> tuple[BallRelations, list[sp.Expr]]:
     """The generic ball, and the parts of its force."""
     cos, sin, speed = names.variable("ball.cos"), names.variable("ball.sin"), cage.rate
     motion = {c.position: sp.Function(c.name)(TIME) for c in coordinates}
     angle = sp.Function("theta")(TIME)
-    # Eq. (6); a fixed outer ring has no coordinates
-    x, y = (
-        sum((s * c.position for c, s in zip(coordinates[axis::2], (1, -1), strict=False)), start=sp.S.Zero)
-        for axis in (0, 1)
-    )
     contact_at = contact_direction(bearing)
-    geometry = contact_at.deflection(x * sp.cos(angle) + y * sp.sin(angle))
+    geometry = contact_at.deflection(apart[0] * sp.cos(angle) + apart[1] * sp.sin(angle))  # Eq. (6)
     approach = sp.Dummy("approach", real=True)
     steepness = sp.diff(contact_at.deflection(approach), approach)
     alike = approach not in steepness.free_symbols  # for all balls

@@ -23,6 +23,7 @@ def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
     """
     assert bearing.inner is not None  # loaded one-way
     given = bearing.inner.mass
+    assert given is not None  # on no shaft that tilts
     if not isinstance(given, EquivalentMass):
         return symbol_of(given)
     assert mechanism is not None  # the reader refuses Eq. (3) without a mechanism

@@ -53,18 +53,27 @@ def load_on(
     ----------
     lever : of a bearing that has a place along the shaft, which bears all forces by it
     """
+    if bearing.coupling == "two-way" or bearing.tilts:
+        return None
     share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
     if linkage is None or reactions is None:
         return scale(share, own.force) if lever is None else lever.bears(own.force, own.moment)
-    if bearing.coupling == "two-way":
-        return None
     joint = linkage.driver  # the reader refuses another one
     reaction = reactions.joint_force[joint.name]
     if lever is None:
         return add(scale(share, reaction), own.force)
+    on_shaft = load_on_shaft(own, linkage, reactions)
+    return lever.bears(on_shaft.force, on_shaft.moment)
+
+
+def load_on_shaft(own: RingLoad, linkage: Linkage | None, reactions: Reactions | None) -> RingLoad:
+    """Sum and moment of all that loads a shaft one-way: forces on the driven body, and loads of the scene."""
+    if linkage is None or reactions is None:
+        return own
     places = {name: symbol_of(place) for name, place in linkage.mechanism.body(linkage.driven).positions}
     moments = [scale(places[name], force) for name, force in reactions.on_driven if name in places]
-    return lever.bears(add(reaction, own.force), add(own.moment, *moments))
+    reaction = reactions.joint_force[linkage.driver.name]
+    return RingLoad(force=add(reaction, own.force), moment=add(own.moment, *moments))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +98,7 @@ class Lever:
 
 def lever_of(bearing: Bearing, bearings: Iterable[Bearing]) -> Lever | None:
     """The lever of a bearing that has a place along the shaft, beside the other one that has."""
-    if bearing.position is None:
+    if bearing.position is None or bearing.tilts:
         return None
     other = next(one for one in bearings if one.position is not None and one is not bearing)
     assert other.position is not None  # the reader refuses any but two

@@ -17,7 +17,19 @@ import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.mechanism.balance import AppliedLoad
-from ballpass.derive.mechanism.kinematics import ZERO, Motion, add, body_point, cross, quarter_turn, scale, subtract
+from ballpass.derive.mechanism.kinematics import (
+    AT_REST,
+    ZERO,
+    Motion,
+    Pair,
+    add,
+    body_point,
+    cross,
+    displaced,
+    quarter_turn,
+    scale,
+    subtract,
+)
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.bearing_records import Bearing
@@ -37,10 +49,10 @@ class Coupled:
     loads : on the bodies, besides the joint's reaction, which is the force of the housing
     """
 
-    inertias: tuple[Inertia, ...]
-    efforts: tuple[Effort, ...]
-    weights: tuple[Effort, ...]
-    loads: tuple[AppliedLoad, ...]
+    inertias: tuple[Inertia, ...] = ()
+    efforts: tuple[Effort, ...] = ()
+    weights: tuple[Effort, ...] = ()
+    loads: tuple[AppliedLoad, ...] = ()
 
 
 def ring(coordinates: tuple[Coordinate, ...], first: int) -> Motion:
@@ -53,15 +65,9 @@ def ring(coordinates: tuple[Coordinate, ...], first: int) -> Motion:
     )
 
 
-def play_of(bearing: Bearing, joint: Joint, coordinates: tuple[Coordinate, ...]) -> Motion:
-    """Motion of the second body's point of a joint relative to the first body's."""
-    inner = ring(coordinates, 0)
-    sign = sp.Integer(1 if joint.bodies[1] == bearing.inner_body else -1)
-    return Motion(
-        position=scale(sign, inner.position),
-        velocity=scale(sign, inner.velocity),
-        acceleration=scale(sign, inner.acceleration),
-    )
+def play_of(bearing: Bearing, joint: Joint, inner: Motion) -> Motion:
+    """Motion of the second body's point of a joint relative to the first body's, by that of the inner ring's body."""
+    return displaced(AT_REST, inner, 1 if joint.bodies[1] == bearing.inner_body else -1)
 
 
 def carriers_of(bearing: Bearing, linkage: Linkage) -> tuple[str, str]:
@@ -71,21 +77,35 @@ def carriers_of(bearing: Bearing, linkage: Linkage) -> tuple[str, str]:
     return bearing.inner_body, linkage.mechanism.joint(bearing.joint or "").other(bearing.inner_body)
 
 
+def on_tilting_shaft(bearing: Bearing, model: BearingModel) -> Coupled:
+    """Forces of the balls and of dampers on a shaft that is loaded one-way and tilts, and the outer ring."""
+    assert bearing.inner is not None  # loaded one-way
+    efforts, inertias = _against(model.ball.ring_force, model.parting), list[Inertia]()
+    if bearing.inner.damping is not None:
+        velocity = ring(model.coordinates, 0).velocity
+        efforts += _against(scale(symbol_of(bearing.inner.damping), velocity), velocity)
+    if bearing.outer is not None:
+        outer, support = ring(model.coordinates, 2), bearing.outer
+        efforts += _against(scale(symbol_of(support.stiffness), outer.position), outer.velocity)
+        efforts += _against(scale(symbol_of(support.damping), outer.velocity), outer.velocity)
+        rates = zip(outer.velocity, outer.acceleration, strict=True)
+        inertias = [Inertia(amount=symbol_of(support.mass), rate=v, acceleration=a) for v, a in rates]
+    return Coupled(inertias=tuple(inertias), efforts=tuple(efforts))
+
+
+def _against(force: Pair, velocity: Pair) -> list[Effort]:
+    return [Effort(amount=-f, rate=v) for f, v in zip(force, velocity, strict=True)]
+
+
 def couple(bearing: Bearing, model: BearingModel, linkage: Linkage) -> Coupled:
     """Forces of the balls on both bodies, and the outer ring where it moves on its own."""
     mechanism, ball, bodies = linkage.mechanism, model.ball, carriers_of(bearing, linkage)
     joint = mechanism.joint(bearing.joint or "")
     count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
-    inner = ring(model.coordinates, 0)
-    outer = (
-        ring(model.coordinates, 2)
-        if bearing.outer is not None
-        else Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
-    )
+    outer = AT_REST if bearing.outer is None else ring(model.coordinates, 2)
     force = scale(count, ball.ring_force)  # of the inner ring on the balls
-    moment = cross(subtract(inner.position, outer.position), force)
-    apart = subtract(inner.velocity, outer.velocity)
-    efforts = [Effort(amount=-f, rate=v) for f, v in zip(force, apart, strict=True)]
+    moment = cross(model.apart, force)
+    efforts = _against(force, model.parting)
     efforts.append(Effort(amount=moment, rate=ball.cage.rate))
     share = ball.cage.share
     points = [body_point(mechanism, body, joint.point(body)) for body in bodies]
@@ -102,8 +122,8 @@ def couple(bearing: Bearing, model: BearingModel, linkage: Linkage) -> Coupled:
         )
         # the damper turns with the housing
         seen = subtract(outer.velocity, scale(turning, quarter_turn(outer.position)))
-        efforts += [Effort(amount=-stiffness * u, rate=v) for u, v in zip(outer.position, outer.velocity, strict=True)]
-        efforts += [Effort(amount=-damping * v, rate=v) for v in seen]
+        efforts += _against(scale(stiffness, outer.position), outer.velocity)
+        efforts += _against(scale(damping, seen), seen)
         torques[1] += damping * cross(outer.position, seen)
         velocity, acceleration = add(housing.velocity, outer.velocity), add(housing.acceleration, outer.acceleration)
         inertias = [Inertia(amount=mass, rate=v, acceleration=a) for v, a in zip(velocity, acceleration, strict=True)]

@@ -120,6 +120,8 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             else "",
             outer_ring=bearing.outer is not None,
             beside=bearing.beside,
+            axis=tuple(b.name for b in scene.bearings if b.tilts)[:2] if bearing.tilts else (),
+            two_way=bearing.coupling == "two-way",
             damping=mf.DampingInfo(
                 law=bearing.damping.law,
                 **({} if law is None else {"in_deflection": law.in_deflection.value, "in_rate": law.in_rate.value}),

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.scene.records import FRAME, Joint, Mechanism
-from ballpass.derive.terms import Definition, components
+from ballpass.derive.scene.quantity import Vector
+from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, Body, Joint, Mechanism
+from ballpass.derive.terms import Definition, components, symbol_of
 
 #: Plane vector: x and y components.
 Pair = tuple[sp.Expr, sp.Expr]
@@ -55,6 +56,18 @@ def subscript(name: str) -> str:
     return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
+class AxialPoint(tuple[sp.Expr, sp.Expr]):
+    """Coordinates [m] of a point in body axes that has a place along the shaft [m]."""
+
+    place: sp.Expr
+
+    def __new__(cls, point: Pair, place: sp.Expr) -> AxialPoint:
+        """The point at a place."""
+        found = super().__new__(cls, point)
+        found.place = place
+        return found
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
     """Position [m], velocity [m/s] and acceleration [m/s^2] of a point in the frame's axes."""
@@ -70,12 +83,12 @@ AT_REST = Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
 Play = Mapping[str, Motion]
 
 
-def displaced(motion: Motion, by: Motion | None, sign: int) -> Motion:
-    """The motion of a point at the distance `by` times `sign`; the motion itself for None."""
-    if by is None:
+def displaced(motion: Motion, by: Motion | None, times: sp.Expr | int) -> Motion:
+    """The motion of a point at the distance `by` `times`; the motion itself for None."""
+    if by is None or times == 0:
         return motion
     one, two = (motion.position, motion.velocity, motion.acceleration), (by.position, by.velocity, by.acceleration)
-    position, velocity, acceleration = (add(a, scale(sp.Integer(sign), b)) for a, b in zip(one, two, strict=True))
+    position, velocity, acceleration = (add(a, scale(sp.sympify(times), b)) for a, b in zip(one, two, strict=True))
     return Motion(position=position, velocity=velocity, acceleration=acceleration)
 
 
@@ -107,6 +120,7 @@ class Pose(Turn):
     anchor_motion : its motion
     origin : motion of the body's origin
     center_of_mass : motion of the centre of mass; its accelerations are defined symbols where they are not trivial
+    slope : of the body's axis along the shaft, and its rates, where it tilts
     """
 
     body: str
@@ -114,6 +128,7 @@ class Pose(Turn):
     anchor_motion: Motion
     origin: Motion
     center_of_mass: Motion
+    slope: Motion | None = None
 
     def rotate(self, vector: Pair) -> Pair:
         """A vector given in body axes, in the frame's axes."""
@@ -122,7 +137,8 @@ class Pose(Turn):
     def motion(self, point: Pair) -> Motion:
         """Motion of the body point with coordinates `point` [m] in body axes."""
         arm = self.rotate(subtract(point, self.anchor))
-        return carried(self.anchor_motion, arm, self.rate, self.acceleration)
+        moved = carried(self.anchor_motion, arm, self.rate, self.acceleration)
+        return displaced(moved, self.slope, point.place if isinstance(point, AxialPoint) else 0)
 
 
 def rotate(cos: sp.Expr, sin: sp.Expr, vector: Pair) -> Pair:
@@ -197,9 +213,17 @@ def name_turn(ledger: Ledger, body: str, cos: sp.Expr, sin: sp.Expr, mark: str) 
     )
 
 
-def place(ledger: Ledger, mechanism: Mechanism, body: str, turn: Turn, anchor: Pair, anchor_motion: Motion) -> Pose:
+def place(
+    ledger: Ledger,
+    mechanism: Mechanism,
+    body: str,
+    turn: Turn,
+    anchor: Pair,
+    anchor_motion: Motion,
+    slope: Motion | None = None,
+) -> Pose:
     """The `Pose` of a moving body; the acceleration of its centre of mass gets names for the equations of motion."""
-    center = components(mechanism.body(body).center_of_mass)
+    center = _at_place(mechanism.body(body), CENTER_OF_MASS, mechanism.body(body).center_of_mass)
     bare = Pose(
         body=body,
         cos=turn.cos,
@@ -210,6 +234,7 @@ def place(ledger: Ledger, mechanism: Mechanism, body: str, turn: Turn, anchor: P
         anchor_motion=anchor_motion,
         origin=anchor_motion,
         center_of_mass=anchor_motion,
+        slope=slope,
     )
     mass_point = bare.motion(center)
     named = ledger.name_pair(
@@ -246,7 +271,12 @@ def body_point(mechanism: Mechanism, body: str, point: str) -> Pair:
     """Coordinates [m] of a named point in the axes of its body or of the frame."""
     if body == FRAME:
         return components(next(p.position for p in mechanism.frame_points if p.name == point))
-    return components(mechanism.body(body).point(point))
+    return _at_place(mechanism.body(body), point, mechanism.body(body).point(point))
+
+
+def _at_place(body: Body, name: str, vector: Vector) -> Pair:
+    point, place = components(vector), dict(body.positions).get(name)
+    return point if place is None else AxialPoint(point, symbol_of(place))
 
 
 def joint_point(mechanism: Mechanism, joint: Joint, body: str) -> Pair:

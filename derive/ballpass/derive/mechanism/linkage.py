@@ -80,8 +80,10 @@ class Linkage:
 
     @property
     def positions(self) -> tuple[sp.Basic, ...]:
-        """The coordinates of play: zero in the ideal linkage."""
-        found = {symbol for motion in self.play.values() for e in motion.position for symbol in e.free_symbols}
+        """The coordinates of play, and of tilts: zero in the ideal linkage."""
+        slope = self.poses[self.driven].slope
+        moving = (*self.play.values(), *(() if slope is None else (slope,)))
+        found = {symbol for motion in moving for e in motion.position for symbol in e.free_symbols}
         return tuple(sp.ordered(found))
 
     @property
@@ -103,7 +105,7 @@ class Linkage:
         return self.pose(body).motion(body_point(self.mechanism, body, point))
 
 
-def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> Linkage:
+def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY, slope: Motion | None = None) -> Linkage:
     """Derive the kinematics of a linkage.
 
     Parameters
@@ -111,6 +113,7 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> 
     mechanism : bodies, joints and driver
     drive : angle, speed and acceleration of the driven body
     play : joints whose two points do not coincide
+    slope : of the axis of the driven body, where it tilts
 
     Raises
     ------
@@ -121,7 +124,7 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> 
     assembly = assemble(mechanism)
     ledger = Ledger()
     poses = {FRAME: frame_pose()}
-    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive, play)
+    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive, play, slope)
     poses[driven.body] = driven
     placements = []
     for dyad in assembly.dyads:
@@ -173,7 +176,15 @@ def check_assembly(
         raise LinkageError(faults)
 
 
-def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, drive: Drive, play: Play) -> Pose:
+def _place_driven(
+    ledger: Ledger,
+    mechanism: Mechanism,
+    driver: Joint,
+    body: str,
+    drive: Drive,
+    play: Play,
+    slope: Motion | None,
+) -> Pose:
     mark = subscript(body)
     cos, sin = name_turn(ledger, body, sp.cos(drive.angle), sp.sin(drive.angle), mark)
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
@@ -187,7 +198,7 @@ def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
     turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration)
-    return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot)
+    return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot, slope)
 
 
 def _points(mechanism: Mechanism, poses: Mapping[str, Pose]) -> tuple[PlacedPoint, ...]:

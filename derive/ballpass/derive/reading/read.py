@@ -60,7 +60,7 @@ MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
 RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
-    *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
+    *("reaction", "shaft", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
 #: Turns before the steady ones of a run whose length is not given, which it drops.
 DROPPED_CYCLES = 50.0
@@ -259,8 +259,9 @@ def _read(root: Table, name: str) -> Scene:
         loads = _read_loads(root, required=shaft is not None) if has_bearing else ()
         if shaft is not None and shaft.ring == "outer":
             _refuse_unbalance(root, loads)
-        bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
-        _check_positions(root, bearings)
+        tilts = _tilts(root, shaft, mechanism, driven)
+        bearings = _read_bearings(root, mechanism, driven, tilts) if has_bearing else ()
+        _check_positions(root, bearings, tilts)
         if not any(bearing.position for bearing in bearings):
             driven = None
             _refuse_places(root, [load.path for load in loads if load.position is not None])
@@ -335,7 +336,23 @@ def _read_run(table: Table, steady: int, span: float | None) -> tuple[RunSetting
         return run, read_keys(table, {"outputs": OUTPUTS})["outputs"]
 
 
-def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[Bearing, ...]:
+def _tilts(root: Table, shaft: Shaft | None, mechanism: Mechanism | None, driven: str | None) -> bool:
+    """Whether the shaft tilts in its bearings; a fault where another body than the driven one has the key."""
+    found = shaft is not None and shaft.transverse_inertia is not None
+    for body in mechanism.bodies if mechanism is not None else ():
+        if body.transverse_inertia is not None and body.name != driven:
+            root.fault(
+                f"mechanism.bodies.{body.name}.transverse_inertia",
+                "only the driven body tilts: the others move in the plane",
+                given=show(body.name),
+                allowed="the body that the driver turns",
+                remedy="delete the key",
+            )
+        found = found or body.transverse_inertia is not None
+    return found
+
+
+def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None, tilts: bool) -> tuple[Bearing, ...]:
     """``[bearing]``, or ``[bearings.<name>]`` for several."""
     bearings = []
     for table, name in _one_or_several(root, "bearing", ""):
@@ -347,7 +364,7 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
                 allowed=f"a name that is none of {listing(RESERVED)}",
                 remedy="give the bearing another name",
             )
-        bearing = read_bearing(table, mechanism, driven, name)
+        bearing = read_bearing(table, mechanism, driven, tilts, name)
         bearings.append(_marked(bearing, names_of(bearing)))
     _check_couplings(root, bearings)
     return tuple(_beside(root, bearing, bearings[:k]) for k, bearing in enumerate(bearings))
@@ -355,7 +372,12 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
 
 def _beside(root: Table, bearing: Bearing, before: Sequence[Bearing]) -> Bearing:
     """A bearing whose inner ring moves as that of another one at the joint, where there is one; coupled two-way."""
-    first = next((b for b in before if b.coupling == bearing.coupling == "two-way" and b.joint == bearing.joint), None)
+    if bearing.tilts:
+        on_shaft = [b for b in before if b.tilts]
+        first = on_shaft[0] if len(on_shaft) >= 2 else None
+    else:
+        two_way = (b for b in before if b.coupling == bearing.coupling == "two-way" and b.joint == bearing.joint)
+        first = next(two_way, None)
     if first is None:
         return bearing
     if bearing.inner_body != first.inner_body:
@@ -371,14 +393,16 @@ def _beside(root: Table, bearing: Bearing, before: Sequence[Bearing]) -> Bearing
         if isinstance(given, dict) and key in given:
             root.fault(
                 f"bearings.{bearing.name}.initial.{key}",
-                f"its inner ring moves as that of the bearing {first.name} beside it",
+                "its inner ring moves with the shaft, whose start those of the first two bearings give"
+                if bearing.tilts
+                else f"its inner ring moves as that of the bearing {first.name} beside it",
                 given=show(given[key]),
-                allowed=f"an initial state of bearings.{first.name} alone",
+                allowed="an initial state of these alone",
                 remedy="delete the key",
             )
     start = bearing.initial
     own = InitialState(position=start.position[2:], velocity=start.velocity[2:])
-    return replace(bearing, beside=first.name, initial=own)
+    return replace(bearing, beside="" if bearing.tilts else first.name, has_axis=bearing.tilts, initial=own)
 
 
 def _one_or_several(root: Table, one: str, example: str) -> Iterator[tuple[Table, str]]:
@@ -424,20 +448,33 @@ def _check_couplings(root: Table, bearings: Sequence[Bearing]) -> None:
         )
 
 
-def _check_positions(root: Table, bearings: Sequence[Bearing]) -> None:
-    """Levers part the forces on a shaft between two bearings."""
+def _check_positions(root: Table, bearings: Sequence[Bearing], tilts: bool) -> None:
+    """Levers part the forces on a shaft between two bearings; one that tilts has two or more."""
     placed = [bearing for bearing in bearings if bearing.position is not None]
-    values = {bearing.position.value for bearing in placed if bearing.position is not None}
-    if not placed or (len(bearings) == len(placed) == 2 and len(values) == 2):
-        return
+    values = [bearing.position.value for bearing in placed if bearing.position is not None]
+    if tilts:
+        on_shaft = [bearing for bearing in bearings if bearing.tilts]
+        if len(on_shaft) == len(placed) >= 2 and len({*values[:2]}) == 2:
+            return
+        if any(bearing.position is None for bearing in on_shaft):  # reported
+            return
+        problem = "the axis of a shaft that tilts runs through the inner rings of its first two bearings"
+        allowed = "two bearings or more on the shaft, the first two at unlike places"
+        remedy = "give it a second bearing"
+    else:
+        if not placed or (len(bearings) == len(placed) == 2 and len({*values}) == 2):
+            return
+        problem = "levers part the forces on a shaft between two bearings at two places"
+        allowed = "position at both of two bearings, and unlike"
+        remedy = "give both a position; with one bearing share, with three or more the shaft a transverse_inertia"
     root.fault(
-        f"{placed[0].path}.position",
-        "levers part the forces on a shaft between two bearings at two places",
-        given=f"places of {len(placed)} of {len(bearings)} bearings"
-        if len(values) == len(placed)
-        else "one place twice",
-        allowed="position at both of two bearings, and unlike",
-        remedy="give both a position; with one bearing or more than two, write share",
+        f"{placed[0].path}.position" if placed else "",
+        problem,
+        given="one place twice"
+        if len({*values}) < len(values)
+        else f"places of {len(placed)} of {len(bearings)} bearings",
+        allowed=allowed,
+        remedy=remedy,
     )
 
 

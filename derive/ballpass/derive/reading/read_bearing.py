@@ -26,7 +26,7 @@ from ballpass.derive.scene.bearing_records import (
     OuterRing,
 )
 from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
-from ballpass.derive.scene.quantity import SceneNumber
+from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.table import Table, listing, suggest
@@ -78,13 +78,21 @@ INITIAL = {
 def read_shaft(table: Table) -> Shaft:
     """Speed of the inner ring where no mechanism turns it."""
     with table:
+        table.refuse(
+            [key for key in ("bending_stiffness", "diameter", "stiffness", "young_modulus") if key in table.data],
+            "the shaft is rigid: it tilts in its bearings, and does not bend",
+            allowed=", ".join(keys_of(Shaft)),
+            remedy="delete the key; take a rotor program for a shaft that bends, or [bearings.NAME.alignment] for the "
+            "tilt that bending gives a bearing",
+        )
         return read_record(Shaft, table)
 
 
-def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, name: str = "") -> Bearing:
+def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, tilts: bool, name: str = "") -> Bearing:
     """A bearing; with a mechanism it must sit at the driver's joint.
 
-    `driven` is the driven body, None where there is no mechanism or the driver has a fault.
+    `driven` is the driven body, None where there is no mechanism or the driver has a fault; `tilts` says whether it, or
+    the shaft, tilts in its bearings.
     """
     with table:
         keys = keys_of(Bearing)
@@ -92,9 +100,13 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
         element = ELEMENTS[ELEMENT.read(table, "element") or next(iter(ELEMENTS))]
-        joint, share, position, count = _read_place(table, mechanism, driven, coupling)
         support, outer = _read_outer_ring(table)
-        inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
+        named = table.data.get("joint")
+        inner_body = ""
+        if coupling == "two-way":
+            inner_body = read_inner_body(table, mechanism, named if isinstance(named, str) else None)
+            tilts = tilts and mechanism is not None and (named, inner_body) == (mechanism.driver.joint, driven)
+        joint, share, position, count, offset = _read_place(table, mechanism, driven, coupling, tilts)
         contact = table.data.get("contact")
         stiff = isinstance(contact, dict) and "stiffness" in contact
         facts = {"element": element.name, "contact": "stiffness" if stiff else "grooves"}
@@ -106,6 +118,8 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             joint=joint,
             share=share,
             position=position,
+            offset=offset,
+            tilts=tilts,
             coupling=coupling,
             inner_body=inner_body,
             count=count,
@@ -113,7 +127,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             contact=element.read_contact(table),
             damping=_read_damping(table, element),
             effects=_read_effects(table, numbers["balls"]),
-            inner=_read_inner_ring(table, mechanism is not None) if coupling == "one-way" else None,
+            inner=_read_inner_ring(table, mechanism is not None, tilts) if coupling == "one-way" else None,
             outer=outer,
             initial=_read_initial(table, support),
             element=element.name,
@@ -126,17 +140,27 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 
 def _read_place(
-    table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str
-) -> tuple[str | None, SceneNumber | None, SceneNumber | None, SceneNumber | None]:
-    """Joint of a bearing, its share of the reaction or its place, and the number of bearings side by side."""
-    keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "position", "count")}
-    carries = replace(choices_of(Bearing)[1], optional=mechanism is None or coupling == "two-way")
+    table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str, tilts: bool
+) -> tuple[str | None, SceneNumber | None, SceneNumber | None, SceneNumber | None, Vector | None]:
+    """Joint of a bearing, its share of the reaction or its place, number of bearings side by side, housing's offset."""
+    keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "position", "count", "offset")}
+    carries = replace(choices_of(Bearing)[1], optional=not tilts and (mechanism is None or coupling == "two-way"))
     if mechanism is not None:
         keys["joint"] = replace(keys["joint"], example=mechanism.driver.joint or "A")
-    facts = {"mechanism": mechanism, "coupling": coupling}
-    name, share, position, count = read_keys(table, keys, (carries,), facts).values()
+    on_tilting = True if tilts else None
+    facts = {"mechanism": mechanism, "coupling": coupling, "tilts": on_tilting}
+    facts["parted"] = True if coupling == "one-way" else on_tilting
+    name, share, position, count, offset = read_keys(table, keys, (carries,), facts).values()
     check_count(table, count)
-    place = name, share, position, count
+    if tilts and share is not None:
+        table.fault(
+            "share",
+            "the shaft tilts, and stiffnesses part its forces between its bearings",
+            given=show(table.data["share"]),
+            allowed='position, as in "40 mm"',
+            remedy="give the bearing its position, or delete transverse_inertia",
+        )
+    place = name, share, position, count, offset
     if mechanism is None:
         return place
     if not name or not mechanism.joints:
@@ -202,8 +226,16 @@ def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
     return tuple(effect.read(table.table(kind), balls) for kind, effect in EFFECTS.items() if table.has(kind))
 
 
-def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
-    with table.table("inner_ring", 'mass = "0.4 kg"') as ring:
+def _read_inner_ring(table: Table, with_mechanism: bool, tilts: bool) -> InnerRing:
+    with table.table("inner_ring", 'mass = "0.4 kg"', required=not tilts) as ring:
+        if tilts:
+            ring.refuse(
+                [key for key in ("mass", "equivalent_mass") if key in ring.data],
+                "the inner ring moves with the shaft that tilts, whose mass contains the ring",
+                allowed="damping alone",
+                remedy="delete the key",
+            )
+            return read_record(InnerRing, ring, mass=None)
         chosen = MASS.choose(ring, keys_of(InnerRing))
         ring.missing = ring.missing or not chosen
         if chosen != ("equivalent_mass",):

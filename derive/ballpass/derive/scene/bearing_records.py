@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.designations import GROUPS
-from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, WholeKey
-from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
+from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, VectorKey, WholeKey
+from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange, Vector
 from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
 from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import CONTAMINATION
@@ -177,10 +177,17 @@ class EquivalentMass:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InnerRing:
-    """Mass moved by the inner ring: a number [kg] or Eq. (3).  `damping` to the frame [N*s/m] or None."""
+    """Mass moved by the inner ring: a number [kg] or Eq. (3); None on a shaft that tilts, which has its own.
 
-    mass: SceneNumber | EquivalentMass = positive(
-        "kg", "Mass moved by the inner ring", "m_{ei}", "0.4 kg", when="this or `equivalent_mass`"
+    `damping` to the frame [N*s/m] or None.
+    """
+
+    mass: SceneNumber | EquivalentMass | None = positive(
+        "kg",
+        "Mass moved by the inner ring",
+        "m_{ei}",
+        "0.4 kg",
+        when="this or `equivalent_mass`; refused on a shaft that tilts, which has its own",
     )
     damping: SceneNumber | None = not_negative(
         "N*s/m", "Viscous damping of the inner ring's motion to the frame", "c_i", "200 N*s/m", optional=True
@@ -358,6 +365,22 @@ _ONE_WAY = (
         remedy="write count = 2 instead of share = 0.5",
     ),
 )
+_PLACED = (
+    Needs(
+        key="parted",
+        why="a bearing coupled two-way takes the load that the motion gives it",
+        words="a share of the load, or on a shaft that tilts",
+        remedy="give the driven body a transverse_inertia, with which it tilts",
+    ),
+)
+_ON_TILTING = (
+    Needs(
+        key="tilts",
+        why="the offset of a housing loads bearings only where their shaft has a stiffness against it",
+        words="a shaft that tilts",
+        remedy="give [shaft] or the driven body a transverse_inertia",
+    ),
+)
 _AXIAL = (Needs(key="element", value="ball", why="a bearing of such elements carries no axial force"),)
 _ONLY_BALLS = (Needs(key="element", value="ball", why="a bearing of such elements has no contact angle"),)
 
@@ -371,6 +394,8 @@ class Bearing:
     `coupling` one-way: `share` is the part of the ideal reaction it takes, `inner` what moves with the inner ring.
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one); `beside` names the first of several at the joint, whose inner ring moves alike.
+    On a shaft that `tilts` the axis runs through the inner rings of the first two bearings; with `has_axis` the inner
+    ring follows from theirs.
     `element` is the kind of its rolling elements, `contact` a record of that kind.  `balls`, their number, is
     structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.  `catalogue`, `cage`, `lubrication`, `alignment` and `fit` (by class) are
@@ -417,11 +442,19 @@ class Bearing:
         "z",
         "40 mm",
         optional=True,
-        when="instead of `share`, for both of two bearings on a shaft",
-        needs=_ONE_WAY,
+        when="instead of `share`, for both of two bearings on a shaft, or for all of one that tilts",
+        needs=_PLACED,
         note="from any plane, which is that of points and loads without a place of their own, in any direction: the "
-        "shares follow by levers, see {doc}`../theory/supports`",
+        "shares follow by levers, or from the tilts of the shaft, see {doc}`../theory/supports`",
     )
+    offset: Vector | None = VectorKey(
+        unit="m",
+        words="the offset of the housing",
+        symbols=("e_h", "e_{h,x}", "e_{h,y}", "e_h", r"\alpha_h"),
+        optional=True,
+        needs=_ON_TILTING,
+        note="vector: how far the housing stands off the line of the others; on a shaft that tilts",
+    ).declared()
     coupling: Literal["one-way", "two-way"] = ChoiceKey(
         words="How bearing and linkage move each other",
         choices=("one-way", "two-way"),
@@ -431,6 +464,8 @@ class Bearing:
     ).declared()
     inner_body: str = ""
     beside: str = ""
+    tilts: bool = False
+    has_axis: bool = False
     count: SceneNumber | None = positive(
         "1",
         "Bearings side by side at the joint",

@@ -74,7 +74,8 @@ class Body:
     """A moving rigid body.
 
     `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate and whose moment balance
-    is not needed.  `positions` are places of its points along the shaft [m], of the driven body alone.
+    is not needed.  `positions` are places of its points along the shaft [m], of the driven body alone; with
+    `transverse_inertia` [kg*m^2] that tilts in its bearings.
     """
 
     name: str
@@ -93,6 +94,14 @@ class Body:
         optional=True,
         when="required, except for a slider on a fixed guide, which does not turn",
         remedy="give a positive value, or delete the key for a body that does not rotate",
+    )
+    transverse_inertia: SceneNumber | None = positive(
+        "kg*m^2",
+        "Moment of inertia of the NAME about axes across the shaft through its centre of mass",
+        "J_{t,INDEX}",
+        "900 kg*mm^2",
+        optional=True,
+        note="of the driven body, which then tilts in its bearings: {doc}`../theory/supports`",
     )
     center_of_mass: Vector = VectorKey(
         unit="m",
@@ -251,9 +260,16 @@ class Mechanism:
         return next(j for j in self.joints if j.name == name)
 
 
+_TILTING = (Needs(key="transverse_inertia", why="only a shaft that tilts in its bearings is a body of its own"),)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """Rotation of a ring where no mechanism gives it: constant speed [rad/s].  The other ring stands."""
+    """Rotation of a ring where no mechanism gives it: constant speed [rad/s].  The other ring stands.
+
+    With `transverse_inertia` [kg*m^2] it is a rigid body that tilts in its bearings, of a `mass` [kg] and a
+    `polar_inertia` [kg*m^2], with its `center_of_mass` at a place along it [m]; without, these are None.
+    """
 
     speed: SceneNumber = quantity(
         "rad/s",
@@ -268,6 +284,33 @@ class Shaft:
         default="inner",
         note="loads act on the inner ring, also where it stands",
     ).declared()
+    transverse_inertia: SceneNumber | None = positive(
+        "kg*m^2",
+        "Moment of inertia of the shaft about axes across it through its centre of mass",
+        "J_t",
+        "0.02 kg*m^2",
+        optional=True,
+        note="the shaft then tilts in its bearings, which have places: {doc}`../theory/supports`",
+    )
+    mass: SceneNumber | None = positive("kg", "Mass of the shaft with the inner rings", "m", "4 kg", needs=_TILTING)
+    polar_inertia: SceneNumber | None = positive(
+        "kg*m^2",
+        "Moment of inertia of the shaft about its axis",
+        "J_p",
+        "0.004 kg*m^2",
+        optional=True,
+        needs=_TILTING,
+        note="its gyroscopic moments act on the tilts; without it none",
+    )
+    center_of_mass: SceneNumber | None = quantity(
+        "m",
+        "Place of the shaft's centre of mass along it",
+        "z_c",
+        "20 mm",
+        optional=True,
+        needs=_TILTING,
+        note="without it zero",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

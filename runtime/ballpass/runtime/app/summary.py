@@ -120,7 +120,7 @@ def _unusual(sol: Solution) -> list[str]:
     said = []
     known = {**sol.parameters, **sol.constants}
     reduced: Mapping[str, Reduction] = sol.reductions or {}
-    for bearing, apart in zip(sol.manifest.bearings, ring_distances(sol.manifest, sol.x.T), strict=True):
+    for bearing, apart in zip(sol.manifest.bearings, ring_distances(sol.manifest, known, sol.x.T), strict=True):
         ball, name = sol.parameters[f"{bearing.path}.ball_diameter"], bearing.prefix + DEFLECTION
         displaced = float(np.max(apart))
         deflection = contact_cosine(bearing, known) * (displaced - radial_gap(bearing, known))

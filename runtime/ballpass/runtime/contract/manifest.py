@@ -305,7 +305,9 @@ class BearingInfo:
     `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one;
     `element` is the kind of its rolling elements, for which "ball" stands in all other names; `inner_stands` says
     whether the inner ring makes no whole turns; `beside` names the first of several two-way bearings of a joint, whose
-    inner rings move alike.  `axial_force` [N] and `shoulder_height` [m] are those of the scene, for its life.
+    inner rings move alike; `axis` names the two whose inner rings carry the axis of a shaft that tilts in the bearing.
+    `two_way` says whether it acts back on its linkage.  `axial_force` [N] and `shoulder_height` [m] are those of the
+    scene, for its life.
     """
 
     name: str
@@ -322,6 +324,8 @@ class BearingInfo:
     element: str = "ball"
     inner_stands: bool = False
     beside: str = ""
+    axis: tuple[str, ...] = ()
+    two_way: bool = False
     alignment: AlignmentInfo | None = None
     fit: FitInfo | None = None
     axial_force: float | None = None
@@ -330,6 +334,17 @@ class BearingInfo:
     def inner_state(self, name: str) -> str:
         """Full name of a state of the inner ring, as "x": of the first of several two-way bearings of a joint."""
         return f"{f'{self.beside}.' if self.beside else self.prefix}inner.{name}"
+
+    def inner_states(self, name: str, values: Mapping[str, float]) -> dict[str, float]:
+        """The states that `inner_state` is a sum of, with their weights: two, where the ring follows from the axis.
+
+        `values` are parameters and derived constants.
+        """
+        if not self.axis or self.name in self.axis:
+            return {self.inner_state(name): 1.0}
+        along = values[f"{self.path}.along_axis"]
+        first, second = (f"{bearing}.inner.{name}" for bearing in self.axis)
+        return {first: 1.0 - along, second: along}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -222,13 +222,16 @@ class Record:
         """Whether the bearing's load is its share of a joint's reaction alone: none is beside it or its plane."""
         names = self.solution.parameters
         given = any(name.startswith(("load.", "loads.")) or ".positions." in name for name in names)
-        return self.manifest.mechanism is not None and not given
+        tilting = self.bearing is not None and self.bearing.axis
+        return self.manifest.mechanism is not None and not (given or tilting)
 
     def ring_load(self) -> Array | None:
         """Load on the inner ring, (n, 2) [N]: the output, else the reaction's share; None where neither is known."""
         if self.has("load.x", "load.y"):
             return np.column_stack((self.values("load.x"), self.values("load.y")))
         bearing = self.bearing
+        if bearing is not None and bearing.axis:
+            return self._force_on_balls() if self.has("ball.force") else None
         if bearing is None or not self.loaded_by_joint:
             return None
         # two-way the reaction is that of the housing, which moves an outer ring of its own as well

@@ -134,7 +134,8 @@ class StaticEquilibrium(Reported):
                 ">elastic force, N": lambda row: "" if row[2] is None else f"{row[2]:z.6g}",
             },
             title=f"Static equilibrium at t = {self.time:.6g} s",
-            caption=f"load {', '.join(f'{part:z.6g} N' for part in self.load)}; net force left {self.residual:.2g} N",
+            caption=f"load {', '.join(f'{part:z.6g} N' for part in self.load)}; " * bool(self.load)
+            + f"net force left {self.residual:.2g} N",
         )
         facts = {"time": self.time, "load": self.load, "positions": positions, "balls": balls}
         return Report(parts=(table,), facts=facts, records=balls, index=("ball",))
@@ -382,8 +383,8 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     applied = own if load is None else vector(load)
     if load is not None and not len(own):
         raise RequestError(
-            "load: the bearings of this scene act back on the linkage, so that its forces load them. "
-            "Omit load, or change the scene's forces."
+            "load: the bearings of this scene have no load of their own: the forces of a linkage that they act back "
+            "on, or of a shaft that tilts, load them. Omit load, or change the scene's forces."
         )
     if applied.shape != own.shape or not np.all(np.isfinite(applied)):
         words = (

@@ -36,7 +36,7 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
             )
     mechanism = manifest.mechanism
     if mechanism is None:
-        whole = [bearing.path for bearing in manifest.bearings if f"{bearing.path}.share" not in values]
+        whole = [one.path for one in manifest.bearings if not one.axis and f"{one.path}.share" not in values]
         if len(manifest.bearings) > 1 and whole:
             yield (
                 f"{', '.join(whole)}: each carries the whole load of the shaft, as no other bearing does. Give each "

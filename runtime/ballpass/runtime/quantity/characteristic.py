@@ -224,9 +224,7 @@ def turns_to_separate(manifest: Manifest, values: Mapping[str, float]) -> int:
 
 def carries_lines(manifest: Manifest, channel: str) -> bool:
     """Whether bearings are heard in a channel: not in what an ideal linkage does, nor in a load that is given."""
-    known = {info.name for info in manifest.parameters} | {info.name for info in manifest.constants}
-    # a bearing that takes a share of the reaction is coupled one-way
-    ideal = all(f"{bearing.path}.share" in known for bearing in manifest.bearings)
+    ideal = not any(bearing.two_way for bearing in manifest.bearings)
     loads = tuple(f"{bearing.prefix}load." for bearing in manifest.bearings)
     return not (channel.startswith(loads) or (manifest.mechanism is not None and ideal and channel.startswith(LINKAGE)))
 

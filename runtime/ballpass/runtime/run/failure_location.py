@@ -132,15 +132,21 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     )
 
 
-def ring_distances(manifest: Manifest, x: np.ndarray) -> np.ndarray:
-    """Distances of the rings of each bearing [m], at states of shape (states, .): shape (bearings, .)."""
+def ring_distances(manifest: Manifest, values: Mapping[str, float], x: np.ndarray) -> np.ndarray:
+    """Distances of the rings of each bearing [m], at states of shape (states, .): shape (bearings, .).
+
+    `values` are parameters and derived constants.
+    """
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
-    found = [np.hypot(*(_apart(bearing, axis, at, x) for axis in "xy")) for bearing in manifest.bearings]
+    found = [np.hypot(*(_apart(bearing, axis, at, values, x) for axis in "xy")) for bearing in manifest.bearings]
     return np.array(found).reshape(len(found), *x.shape[1:])
 
 
-def _apart(bearing: BearingInfo, axis: str, at: Mapping[str, int], x: np.ndarray) -> np.ndarray:
+def _apart(
+    bearing: BearingInfo, axis: str, at: Mapping[str, int], values: Mapping[str, float], x: np.ndarray
+) -> np.ndarray:
     """Position of the inner ring relative to the outer one along an axis [m], at states of shape (states, .)."""
     outer = at.get(f"{bearing.prefix}outer.{axis}")
-    inner = x[at[bearing.inner_state(axis)]]
+    inner = sum(weight * x[at[name]] for name, weight in bearing.inner_states(axis, values).items())
+    inner = inner - values.get(f"{bearing.path}.offset.{axis}", 0.0)
     return np.asarray(inner if outer is None else inner - x[outer])

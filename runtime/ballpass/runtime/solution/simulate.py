@@ -132,7 +132,7 @@ def _refuse_void(run: Run, trajectory: Trajectory) -> None:
     manifest, values, samples = run.model.manifest, run.numbers.values, trajectory.finished
     first = int(np.searchsorted(trajectory.t[:samples], run.start - trajectory.near))
     counted = slice(first if first < samples else 0, samples)
-    apart = ring_distances(manifest, trajectory.x[counted].T)
+    apart = ring_distances(manifest, values, trajectory.x[counted].T)
     # far from it wherever the balls are
     near = [values[f"{bearing.path}.ball_diameter"] * FLATTENED / 2.0 for bearing in manifest.bearings]
     if not apart.size or np.all(np.max(apart, axis=1) < near):

@@ -38,10 +38,10 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     names = [] if chain is None else [*chain.names, "time"]
     if quantity.kind == "static_deflection":
         info = next(one for one in model.manifest.bearings if one.prefix == quantity.channel)
-        inner = [rest.coordinates.index(info.inner_state(axis)) for axis in "xy"]
-        place = rest.positions[inner]
+        states = [info.inner_states(axis, numbers.values) for axis in "xy"]
+        place = np.array([sum(weight * rest[name] for name, weight in one.items()) for one in states])
         value, ball = float(np.hypot(*place)), None
-        rows = rest.derivative("positions", names)[inner] if names else np.zeros((2, 1))
+        rows = rest.derivative([info.inner_state(axis) for axis in "xy"], names) if names else np.zeros((2, 1))
         slope = place @ rows / value if value else np.zeros(rows.shape[1])
     else:
         bearings = model.manifest.bearings
