@@ -33,6 +33,7 @@ PICTURES = {
     "punching_press": ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak_moment"),
     "four_bar": ("peak_moment",),
     "varying_compliance": ("orbit", "peak_moment"),
+    "four_cylinder": ("shaft_loads",),
 }
 
 #: Spectra of the rotor with a table more, as the how-to pages call `ballpass spectrum`.

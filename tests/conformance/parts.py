@@ -35,6 +35,7 @@ REGISTERED: Mapping[str, set[str]] = {
     "drive": set(DRIVES),
     "force": {kind_of_force(t.key, pathway, law) for t in FORCE_TABLES for pathway in t.pathways for law in t.laws},
     "dyad": {dyad.kind for dyad in DYADS},
+    "shaft": {"tilting"},
 }
 
 
@@ -360,6 +361,23 @@ def _dyads() -> list[Part]:
     ]
 
 
+# a shaft that tilts, in two bearings that carry its axis and a third one on an elastic housing off their line
+
+ROTOR = (ROOT / "tests/physics/tilting_rotor.toml").read_text(encoding="utf-8")
+
+
+def _shafts() -> list[Part]:
+    before, _, run = ROTOR.partition("[run]")
+    third = before[before.index("[bearings.right]") :].replace(".right]", ".third]")
+    third = third.replace('"80 mm"', '"15 mm"\noffset = ["3 um", "-2 um"]')
+    support = 'support = "elastic", mass = "0.5 kg", stiffness = "5e7 N/m", damping = "500 N*s/m"'
+    text = (before + third.replace('support = "fixed"', support)).replace(
+        'law = "none"', 'law = "tangent", ratio = "2e-5 s"'
+    )
+    docs = ("theory/supports.md", "A shaft that tilts")
+    return [Part(registry="shaft", name="tilting", text=f"{text}[run]{run}", docs=docs)]
+
+
 # scenes without states: a driver at constant speed, and no bearing
 
 _SLIDER_CRANK = """
@@ -450,8 +468,9 @@ QUICK = (
         "force springs TwoPoints SpringDamper",
     ),
     *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR"),
+    "shaft tilting",
 )
-PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads())
+PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads(), *_shafts())
 
 
 def cases(parts: Iterable[Part] = PARTS) -> list[Any]:

@@ -203,7 +203,9 @@ class Absolute:
                 dict(self.mechanism.body(self.driven).positions).get(joint.point(self.driven))
             )
             inner = self.place(self.driven, arm, q, v)
-            housing.position = housing.position + (0.0 if bearing.offset is None else self.vector(bearing.offset))
+            housing.position = housing.position + (
+                0.0 if bearing.offset is None else np.array([self.value(q) for q in bearing.offset])
+            )
         return inner, housing, housing if bearing.outer is None else self.ring(bearing.name, q, v)
 
     def _guessed(self, guess: Mapping[tuple[str, str], tuple[float, float]]) -> Array:

@@ -15,6 +15,7 @@ import pytest
 from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
+from ballpass.runtime.plot.gallery import draw
 
 SCENE = (Path(__file__).parent / "tilting_rotor.toml").read_text(encoding="utf-8")
 CRANK = (Path(__file__).parent / "overhung_crank.toml").read_text(encoding="utf-8")
@@ -172,6 +173,37 @@ def test_at_rest_two_bearings_carry_by_levers(model_of: Callable[..., Model]) ->
                 assert values[f"{name}.ring_force.{axis}"] == pytest.approx(
                     expected[f"{name}.load.{axis}"], abs=1e-7 * size
                 )
+
+
+def test_a_figure_of_the_shaft_has_all_forces_at_their_places(model_of: Callable[..., Model]) -> None:
+    """Of the bearings and of what is on the crank, at the sample of the highest force of a bearing."""
+    model = model_of(CRANK, "overhung_crank")
+    run = model.simulate()
+    figure = draw("shaft_loads", model, run)
+    highest = int(np.argmax(np.hypot(run["front.load.x"], run["front.load.y"])))  # the front one bears more
+    for axes in figure.axes:
+        drawn = dict(text.get_text().split("\n") for text in axes.texts if text.get_text())
+        assert set(drawn) == {"front", "rear", "belt", "B"}
+    # along y, the last panel
+    assert drawn["belt"] == "0"
+    assert float(drawn["rear"]) == pytest.approx(-run["rear.load.y"][highest], abs=0.5)
+    assert float(drawn["B"]) == pytest.approx(run["reaction.B.y"][highest], abs=0.5)
+
+
+@pytest.mark.long
+def test_five_bearings_of_an_engine_carry_what_its_plane_model_has(make_model: Callable[..., Model]) -> None:
+    """Impulse of all bearings over a cycle is that of the reaction of the linkage, less the momentum of the shaft."""
+    model = make_model("four_cylinder")
+    run = model.simulate(rtol=1e-9, transient=2, cycles=4)
+    speeds = [run[f"{name}.inner.vy"] for name in ("main_1", "main_2")]
+    places = [model.parameters[f"bearings.{name}.position"] for name in ("main_1", "main_2")]
+    center = speeds[0] - places[0] * (speeds[1] - speeds[0]) / (places[1] - places[0])
+    carried = sum(run[f"main_{k}.ring_force.y"] for k in range(1, 6))
+    impulse = np.trapezoid(run["reaction.A.y"] - carried, run.t)
+    momentum = model.parameters["mechanism.bodies.crankshaft.mass"] * (center[-1] - center[0])
+    assert impulse == pytest.approx(momentum, abs=1e-4 * np.trapezoid(np.abs(carried), run.t))
+    peaks = [np.max(np.abs(run[f"main_{k}.ring_force.y"])) for k in range(1, 6)]
+    assert peaks[0] > 1.5 * peaks[2]  # the middle one has two cranks that never fire together
 
 
 @pytest.mark.parametrize(

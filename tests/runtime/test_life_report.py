@@ -217,7 +217,8 @@ set.load.force.y = "-250 lbf"
 
 def test_a_duty_cycle_has_the_mean_load_and_basic_life_of_a_textbook(model_of: Callable[..., Model]) -> None:
     """650, 750 and 250 lbf for 30, 10 and 20 minutes of an hour: 597.05 lbf, and (7700/597.05)^3 million turns."""
-    report = model_of(THREE_LOADS, "three_loads").life(cycles=60, transient=40, reliability=0.95)
+    stated = THREE_LOADS + '[run]\nreliability = "95 %"\n'
+    report = model_of(stated, "three_loads").life(cycles=60, transient=40)
     (found,) = report.duty
     pound = 4.4482216152605
     assert found.mean_load == pytest.approx(597.053 * pound, rel=1e-4)

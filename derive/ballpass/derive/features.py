@@ -18,7 +18,7 @@ from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
+from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
 from ballpass.derive.system import derive
 from ballpass.runtime.ratings.elements import element_words
 
@@ -117,6 +117,15 @@ def _features(scene: Scene) -> Iterator[Feature]:
     mechanism = scene.mechanism
     if mechanism is not None:
         yield from _of_mechanism(scene, mechanism)
+    if any(bearing.tilts for bearing in scene.bearings):
+        bodies = () if mechanism is None else mechanism.bodies
+        driven = [f"mechanism.bodies.{body.name}" for body in bodies if body.transverse_inertia is not None]
+        yield Feature(
+            name="tilts of the shaft",
+            path=f"{driven[0] if driven else 'shaft'}.transverse_inertia",
+            modelled="a rigid shaft that tilts in its bearings, with gyroscopic moments",
+            without=None,
+        )
     for load in scene.loads:
         rest = tuple(other for other in scene.loads if other is not load)
         yield Feature(
@@ -209,7 +218,16 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
     mechanism, or its speed changes."""
     if not scene.bearings or scene.coupled or mechanism.driver.table is not None:
         return None
-    bearings = []
+    bearings, shaft = [], Shaft(speed=mechanism.driver.speed, ring="inner", mass=None)
+    for body in mechanism.bodies:
+        if body.transverse_inertia is not None:
+            shaft = replace(
+                shaft,
+                transverse_inertia=body.transverse_inertia,
+                mass=body.mass,
+                polar_inertia=body.inertia,
+                center_of_mass=dict(body.positions).get(CENTER_OF_MASS),
+            )
     for bearing in scene.bearings:
         inner = bearing.inner
         assert inner is not None  # loaded one-way
@@ -221,7 +239,7 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
     return replace(
         scene,
         mechanism=None,
-        shaft=Shaft(speed=mechanism.driver.speed, ring="inner"),
+        shaft=shaft,
         bearings=tuple(bearings),
     )
 

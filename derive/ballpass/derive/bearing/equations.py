@@ -23,7 +23,7 @@ from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import TIME, Definition, Names, components, names_of, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
@@ -109,7 +109,7 @@ def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
     if coefficient != 0:
         constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
     coordinates = ring_coordinates(bearing)
-    off = (sp.S.Zero, sp.S.Zero) if bearing.offset is None else components(bearing.offset)
+    off = (sp.S.Zero, sp.S.Zero) if bearing.offset is None else tuple(map(symbol_of, bearing.offset))
     # a fixed outer ring has no coordinates
     sides = [[*zip(coordinates[axis::2], (1, -1), strict=False)] for axis in (0, 1)]
     apart = tuple(sum((s * c.position for c, s in side), start=-e) for side, e in zip(sides, off, strict=True))

@@ -397,7 +397,9 @@ def _beside(root: Table, bearing: Bearing, before: Sequence[Bearing]) -> Bearing
                 if bearing.tilts
                 else f"its inner ring moves as that of the bearing {first.name} beside it",
                 given=show(given[key]),
-                allowed="an initial state of these alone",
+                allowed="an initial state of the first two alone"
+                if bearing.tilts
+                else f"an initial state of bearings.{first.name} alone",
                 remedy="delete the key",
             )
     start = bearing.initial

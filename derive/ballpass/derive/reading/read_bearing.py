@@ -26,7 +26,7 @@ from ballpass.derive.scene.bearing_records import (
     OuterRing,
 )
 from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
-from ballpass.derive.scene.quantity import SceneNumber, Vector
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.table import Table, listing, suggest
@@ -141,7 +141,9 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 def _read_place(
     table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str, tilts: bool
-) -> tuple[str | None, SceneNumber | None, SceneNumber | None, SceneNumber | None, Vector | None]:
+) -> tuple[
+    str | None, SceneNumber | None, SceneNumber | None, SceneNumber | None, tuple[SceneNumber, SceneNumber] | None
+]:
     """Joint of a bearing, its share of the reaction or its place, number of bearings side by side, housing's offset."""
     keys = {key: keys_of(Bearing)[key] for key in ("joint", "share", "position", "count", "offset")}
     carries = replace(choices_of(Bearing)[1], optional=not tilts and (mechanism is None or coupling == "two-way"))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.designations import GROUPS
-from ballpass.derive.scene.keys import ChoiceKey, Needs, TextKey, VectorKey, WholeKey
-from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange, Vector
+from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey, TextKey, WholeKey
+from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
 from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.ratings.life import CONTAMINATION
@@ -447,13 +447,14 @@ class Bearing:
         note="from any plane, which is that of points and loads without a place of their own, in any direction: the "
         "shares follow by levers, or from the tilts of the shaft, see {doc}`../theory/supports`",
     )
-    offset: Vector | None = VectorKey(
+    offset: tuple[SceneNumber, SceneNumber] | None = PairKey(
         unit="m",
-        words="the offset of the housing",
-        symbols=("e_h", "e_{h,x}", "e_{h,y}", "e_h", r"\alpha_h"),
+        words="Offset of the housing, AXIS",
+        symbol=r"e_{h,AXIS}",
+        example="20 um",
         optional=True,
         needs=_ON_TILTING,
-        note="vector: how far the housing stands off the line of the others; on a shaft that tilts",
+        note="how far the housing stands off the line of the others; on a shaft that tilts",
     ).declared()
     coupling: Literal["one-way", "two-way"] = ChoiceKey(
         words="How bearing and linkage move each other",

@@ -250,7 +250,7 @@ class PairKey(QuantityKey):
 
     def absent(self, table: Table, name: str) -> Any:
         """Twice the default."""
-        return self.value(table, name, [self.default, self.default])
+        return None if self.optional else self.value(table, name, [self.default, self.default])
 
     def placeholder(self, table: Table, name: str) -> Any:
         """No component."""

@@ -488,6 +488,15 @@ class RunSettings:
         remedy="write rtol = 1e-6 unless another value is needed",
         note="see {doc}`../theory/integration`",
     )
+    reliability: float = quantity(
+        "1",
+        "Share of the bearings that reach the lives of `ballpass life`",
+        example=0.95,
+        default=0.9,
+        setting=True,
+        bounds=Bounds(least=0.9, most=0.99),
+        remedy="give 90, 95, 96, 97, 98 or 99 %, which ISO 281 has factors for",
+    )
     at_rest: bool = False
     stated: bool = True
 

@@ -199,6 +199,7 @@ class RunInfo:
 
     `at_rest`: rings start at rest under the load of t = 0, for the scene says neither where nor what is transient.
     `stated`: whether the scene gives turns of its run; otherwise they are those of the steady machine.
+    `reliability`: share of bearings that reach the lives of a report [1].
     """
 
     cycles: float | None
@@ -209,6 +210,7 @@ class RunInfo:
     rtol: float
     at_rest: bool = False
     stated: bool = True
+    reliability: float = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -73,7 +73,7 @@ class CombinedLoad:
             x, y, e = self.factors
             found += f" ISO 281: X {x:.2f}, Y {y:.2f} where F_a/F_r exceeds {e:.2f}."
         return (
-            f"{found} The motion has neither: its forces, stiffness and frequencies stay radial. Static safety, "
+            f"{found} Bearings of the motion resist neither: their forces and stiffness stay radial. Static safety, "
             "modified life and duty cycle include them; all other numbers are radial."
         )
 

@@ -116,7 +116,7 @@ def _bearing(
     powers, balls = history.powers[info.prefix], (ratings.inner_ball, ratings.outer_ball)
     turns = None if why else float(life.raceway_life(balls, powers, ratings.life))
     load = samples.equivalent_load(float(ratings.life.basic))
-    tilt = _tilt(info, values, load)
+    tilt = _tilt(info, values, load, samples.tilt)
     combined = combined_load(info, values, ratings, samples, tilt.total, turns=not why)
     found, heaviest = (turns, force) if combined is None else (combined.life, max(force, combined.peak_force))
     ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
@@ -190,8 +190,11 @@ def _oscillation(
     )
 
 
-def _tilt(info: BearingInfo, values: Mapping[str, float], load: float) -> Tilt:
-    """Tilt of the rings by what the scene says of shaft and housing, and what the clearance leaves free."""
+def _tilt(info: BearingInfo, values: Mapping[str, float], load: float, shaft: float | None) -> Tilt:
+    """Tilt of the rings by what the scene says of shaft and housing, and what the clearance leaves free.
+
+    `shaft` is that of a rigid one in its bearings, largest of the run.
+    """
     said, geometry = info.alignment, geometry_of(info, values)
     free, keys = None, ("inner_groove_radius", "outer_groove_radius")
     if all(key in geometry.contact for key in keys):
@@ -200,11 +203,11 @@ def _tilt(info: BearingInfo, values: Mapping[str, float], load: float) -> Tilt:
             float(geometry.diameter), float(geometry.pitch), (inner, outer), 2.0 * radial_gap(info, values)
         )
     if said is None:
-        return Tilt(misalignment=None, bending=None, free=free)
+        return Tilt(misalignment=None, bending=None, free=free, shaft=shaft)
     bending = None
     if said.span is not None and said.shaft_diameter is not None:
         bending = shaft_slope(load, said.span, said.shaft_diameter)
-    return Tilt(misalignment=said.misalignment, bending=bending, free=free)
+    return Tilt(misalignment=said.misalignment, bending=bending, free=free, shaft=shaft)
 
 
 def static_safety(balls: int, static_rating: float, force: float) -> float:

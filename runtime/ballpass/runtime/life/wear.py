@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.ratings.life import combined_load
@@ -49,6 +50,7 @@ class LoadSamples:
     in_outer, in_inner : angle of ball 1 as the rings see it, shape (samples,) [rad]
     contact_angle : [rad]
     deep_groove : whether the bearing has no contact angle of its own, whatever its preload makes of it
+    tilt : largest of a rigid shaft in its bearings [rad]; None where it has none
     """
 
     time: Array
@@ -59,6 +61,7 @@ class LoadSamples:
     in_inner: Array
     contact_angle: float = 0.0
     deep_groove: bool = True
+    tilt: float | None = None
 
     @property
     def axial(self) -> Array:
@@ -117,8 +120,18 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
             deep_groove=numbers.values.get(f"{bearing.path}.contact_angle", 0.0) < ANGULAR_CONTACT,
             in_outer=outer[:, 0],
             in_inner=inner[:, 0],
+            tilt=_tilt(bearing, numbers.values, dict(zip(model.states, states.T, strict=True))),
         )
     return found
+
+
+def _tilt(bearing: BearingInfo, values: Mapping[str, float], states: Mapping[str, Array]) -> float | None:
+    """Largest tilt of the shaft whose axis runs through the inner rings of two bearings [rad]."""
+    if not bearing.axis:
+        return None
+    ends = [np.array([states[f"{name}.inner.{axis}"] for axis in "xy"]) for name in bearing.axis]
+    first, second = (values[f"bearings.{name}.position"] for name in bearing.axis)
+    return float(np.max(np.hypot(*(ends[1] - ends[0]))) / abs(second - first))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

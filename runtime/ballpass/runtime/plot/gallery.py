@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot import CAPTIONS, loads, moment, motion
+from ballpass.runtime.plot import CAPTIONS, loads, moment, motion, shaft
 from ballpass.runtime.plot.record import Record, gather
 from ballpass.runtime.plot.style import write_figures
 
@@ -24,12 +24,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FigureKind:
-    """A figure: name of its file, whether a record has its data, how it is drawn, and its description."""
+    """A figure: name of its file, whether a record has its data, how it is drawn, its description.
+
+    `whole` says whether it is of all bearings.
+    """
 
     name: str
     possible: Callable[[Record], bool]
     draw: Callable[[Record], Figure]
     description: str
+    whole: bool = False
 
 
 def _has_load_curve(record: Record) -> bool:
@@ -65,6 +69,7 @@ FIGURES = (
     FigureKind("phase_portrait", _has_phases, motion.phase_portrait, "velocity over displacement along x (Fig. 7)"),
     FigureKind("ball_loads", _has_balls, loads.ball_loads, "contact load of every ball over two turns (Fig. 8)"),
     FigureKind("peak_moment", _has_moment, moment.peak_moment, "mechanism and bearing at the highest ball force"),
+    FigureKind("shaft_loads", shaft.has_shaft, shaft.shaft_loads, "forces on the shaft along its axis", whole=True),
 )
 
 
@@ -126,7 +131,8 @@ def draw_all(
         for bearing in model.manifest.bearings or (None,):
             record = gather(model, solution, bearing, longer)
             ending = f"_{bearing.name}" if bearing is not None and bearing.name else ""
-            yield from ((f"{kind.name}{ending}", kind.draw(record)) for kind in FIGURES if kind.possible(record))
+            for kind in (kind for kind in FIGURES if kind.possible(record)):
+                yield kind.name + ending * (not kind.whole), kind.draw(record)
 
     folder.mkdir(parents=True, exist_ok=True)
     return write_figures(figures(), folder, formats, CAPTIONS)

@@ -30,9 +30,10 @@ StepperMethod = Annotated[
 ]
 
 Reliability = Annotated[
-    float,
+    float | None,
     Option(
-        words="Share of the bearings that reach the lives of the report: 90, 95, 96, 97, 98 or 99 %.",
+        words="Share of the bearings that reach the lives of the report: 90, 95, 96, 97, 98 or 99 %. Default: that of "
+        "the scene, 90 %.",
         example='"95 %"',
         shown="SHARE",
         unit="1",
@@ -69,7 +70,7 @@ def life(
     cycles: Cycles = None,
     *,
     transient: Transient = None,
-    reliability: Reliability = 0.9,
+    reliability: Reliability = None,
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     method: StepperMethod = None,
@@ -114,7 +115,8 @@ def life(
         initial=start_of(model, numbers, initial),
     )
     with shown("simulating for life", progress) as tell:
-        report = life_report(model, dict(parameters or {}), replace(request, progress=tell), of_table(reliability))
+        share = of_table(model.manifest.run.reliability if reliability is None else reliability)
+        report = life_report(model, dict(parameters or {}), replace(request, progress=tell), share)
     options = {"cycles": cycles, "transient": transient, "rtol": rtol, "method": method}
     return replace(report, fits=tuple(_fits(model, report, parameters or {}, **options)))
 

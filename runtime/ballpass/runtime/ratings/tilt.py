@@ -15,26 +15,38 @@ ARCMIN = math.pi / 180.0 / 60.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tilt:
-    """Tilt of the rings [rad]: `misalignment` and `bending`, None where the scene says nothing of it, and `free`."""
+    """Tilt of the rings [rad]: `misalignment`, `bending`, and of a rigid `shaft`, None where nothing is known of it.
+
+    `free` is what the clearance leaves free.
+    """
 
     misalignment: float | None
     bending: float | None
     free: float | None
+    shaft: float | None = None
+
+    @property
+    def _parts(self) -> dict[str, float | None]:
+        return {
+            "misalignment": self.misalignment,
+            "bending of the shaft": self.bending,
+            "the shaft's motion in its bearings, at most": self.shaft,
+        }
 
     @property
     def total(self) -> float:
-        """All that the scene says [rad]."""
-        return (self.misalignment or 0.0) + (self.bending or 0.0)
+        """Sum of all parts [rad]."""
+        return sum(value for value in self._parts.values() if value is not None)
 
     @property
     def words(self) -> str:
         """What it says, in a sentence."""
         free = "" if self.free is None else f"the clearance leaves {self.free / ARCMIN:.3g} arcmin free"
-        if self.misalignment is None and self.bending is None:
+        if all(value is None for value in self._parts.values()):
             known = "Misalignment and bending of the shaft are in no number here"
             return f"{known}{f'; {free}' if free else ''}."
-        parts = {"misalignment": self.misalignment, "bending of the shaft": self.bending}
-        causes = ", ".join(f"{name} {value / ARCMIN:.3g} arcmin" for name, value in parts.items() if value is not None)
+        parts = self._parts.items()
+        causes = ", ".join(f"{name} {value / ARCMIN:.3g} arcmin" for name, value in parts if value is not None)
         return f"Tilt by {causes}{f'; {free}' if free else ''}."
 
     @property

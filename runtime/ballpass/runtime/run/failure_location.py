@@ -94,7 +94,7 @@ def ball_deflections(model: LoadedModel, numbers: Numbers, time: float, state: n
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
     found = []
     for bearing, angles in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
-        x, y = (_apart(bearing, axis, at, state) for axis in "xy")
+        x, y = (_apart(bearing, axis, at, values, state) for axis in "xy")
         apart = x * np.cos(angles) + y * np.sin(angles) - radial_gap(bearing, values)
         found.append(contact_cosine(bearing, values) * apart)
     return found

@@ -28,7 +28,7 @@ _DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$|_quantities$|^static_forces$
 _NEVER = (
     "lubricant film and friction of the contacts",
     "slip of the balls; their inertia and centrifugal force",
-    "axial motion and tilting of the rings",
+    "axial motion of the rings, and moments with which bearings resist tilts",
     "elasticity of the mechanism's bodies and of the rings themselves",
 )
 
