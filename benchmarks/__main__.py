@@ -41,7 +41,7 @@ def state() -> dict[str, str]:
     compiler = find_compiler()
     facts = (
         _processor(),
-        f"{os.cpu_count()} cores",
+        f"{os.cpu_count()} cores, vectors of {CASES[0].model().ensemble_driver.lanes} doubles",
         f"{platform.system()} {platform.machine()}",
         _said(*compiler.command, "--version").partition("\n")[0] if compiler else "no compiler",
         f"Python {platform.python_version()}",

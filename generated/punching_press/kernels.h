@@ -6,8 +6,9 @@
 #include <math.h>
 
 #include "trig.h"
+#include "width.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RINGS = 5, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 61, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RINGS = 5, BP_NR = 7, BP_NG = 6 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
@@ -906,7 +907,7 @@ static inline void bp_cage(double t, const double *restrict u, const double *res
     w[3] = w0;
 }
 
-/* Stage variables from cosines and sines of its angles, for BP_LANES times at once. */
+/* Stage variables from cosines and sines of its angles, for BP_AT_ONCE times. */
 static inline void bp_stage_turned_lanes(const double *restrict C, const double *restrict S, const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
 {
     (void)t;
@@ -938,15 +939,15 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
     const double s113 = p[3];
     const double s130 = c[31];
 #pragma omp simd
-    for (int lane = 0; lane < BP_LANES; lane++) {
-        double w0 = C[0 * BP_LANES + lane];
-        w[0 * BP_LANES + lane] = w0;
-        w0 = S[0 * BP_LANES + lane];
-        w[1 * BP_LANES + lane] = w0;
-        double w1 = C[1 * BP_LANES + lane];
+    for (int lane = 0; lane < BP_AT_ONCE; lane++) {
+        double w0 = C[0 * BP_AT_ONCE + lane];
+        w[0 * BP_AT_ONCE + lane] = w0;
+        w0 = S[0 * BP_AT_ONCE + lane];
+        w[1 * BP_AT_ONCE + lane] = w0;
+        double w1 = C[1 * BP_AT_ONCE + lane];
         double w3 = w1 * s6;
         w3 = w3 * s8;
-        double w5 = S[1 * BP_LANES + lane];
+        double w5 = S[1 * BP_AT_ONCE + lane];
         double w2 = w5 * s6;
         w2 = w2 * s12;
         w3 = w3 - w2;
@@ -1031,7 +1032,7 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w4 = w4 * s113;
         w8 = w8 + w4;
         w8 = s4 * w8;
-        w[2 * BP_LANES + lane] = w8;
+        w[2 * BP_AT_ONCE + lane] = w8;
         w16 = w16 * w9;
         w18 = w18 * s12;
         w16 = w16 + w18;
@@ -1046,11 +1047,11 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w16 = w16 + w13;
         w16 = w16 - s130;
         w0 = s4 * w16;
-        w[3 * BP_LANES + lane] = w0;
+        w[3 * BP_AT_ONCE + lane] = w0;
     }
 }
 
-/* Stage variables and their time derivatives from cosines and sines of its angles, for BP_LANES times at once. */
+/* Stage variables and their time derivatives from cosines and sines of its angles, for BP_AT_ONCE times. */
 static inline void bp_stage_rate_turned_lanes(const double *restrict C, const double *restrict S, const double *restrict at, const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w, double *restrict wt)
 {
     (void)t;
@@ -1084,15 +1085,15 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
     const double s134 = at[0];
     const double s140 = at[1];
 #pragma omp simd
-    for (int lane = 0; lane < BP_LANES; lane++) {
-        double w0 = C[0 * BP_LANES + lane];
-        w[0 * BP_LANES + lane] = w0;
-        double w1 = S[0 * BP_LANES + lane];
-        w[1 * BP_LANES + lane] = w1;
-        double w3 = C[1 * BP_LANES + lane];
+    for (int lane = 0; lane < BP_AT_ONCE; lane++) {
+        double w0 = C[0 * BP_AT_ONCE + lane];
+        w[0 * BP_AT_ONCE + lane] = w0;
+        double w1 = S[0 * BP_AT_ONCE + lane];
+        w[1 * BP_AT_ONCE + lane] = w1;
+        double w3 = C[1 * BP_AT_ONCE + lane];
         double w5 = w3 * s6;
         w5 = w5 * s8;
-        double w7 = S[1 * BP_LANES + lane];
+        double w7 = S[1 * BP_AT_ONCE + lane];
         double w8 = w7 * s6;
         w8 = w8 * s12;
         w5 = w5 - w8;
@@ -1177,7 +1178,7 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w43 = w43 * s113;
         w21 = w21 + w43;
         w21 = s4 * w21;
-        w[2 * BP_LANES + lane] = w21;
+        w[2 * BP_AT_ONCE + lane] = w21;
         w21 = w24 * w14;
         w37 = w37 * s12;
         w21 = w21 + w37;
@@ -1192,12 +1193,12 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w25 = w25 + w35;
         w25 = w25 - s130;
         w25 = s4 * w25;
-        w[3 * BP_LANES + lane] = w25;
+        w[3 * BP_AT_ONCE + lane] = w25;
         w1 = w1 * s134;
         w1 = -w1;
-        wt[0 * BP_LANES + lane] = w1;
+        wt[0 * BP_AT_ONCE + lane] = w1;
         w0 = w0 * s134;
-        wt[1 * BP_LANES + lane] = w0;
+        wt[1 * BP_AT_ONCE + lane] = w0;
         w7 = w7 * s140;
         w25 = s6 * w7;
         w25 = s8 * w25;
@@ -1317,7 +1318,7 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w34 = s113 * w34;
         w4 = w4 - w34;
         w4 = s4 * w4;
-        wt[2 * BP_LANES + lane] = w4;
+        wt[2 * BP_AT_ONCE + lane] = w4;
         w14 = w14 * w16;
         w24 = w24 * w23;
         w14 = w14 + w24;
@@ -1335,7 +1336,7 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w45 = s113 * w41;
         w14 = w14 + w45;
         double w2 = s4 * w14;
-        wt[3 * BP_LANES + lane] = w2;
+        wt[3 * BP_AT_ONCE + lane] = w2;
     }
 }
 

@@ -8,8 +8,9 @@ this text.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from types import MappingProxyType
 
 import casadi as ca
 
@@ -68,7 +69,7 @@ def print_function(
     scalars: frozenset[str] = frozenset(),
     lanes: str = "",
     varying: frozenset[str] = frozenset(),
-    strided: frozenset[str] = frozenset(),
+    strided: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """C99 text of an SX function.
 
@@ -81,7 +82,7 @@ def print_function(
         into SIMD
         lanes.  Results, and arguments named in `varying`, then hold that many values for each entry, next to each other
     varying : arguments that differ from lane to lane
-    strided : arguments that are the same in all lanes, one column of such results: their entries are `lanes` apart
+    strided : arguments that are the same in all lanes, one column of results in lanes: how far their entries are apart
 
     Raises
     ------
@@ -127,7 +128,7 @@ def print_function(
             if lanes and name in varying:
                 place, same = f"{take[1]} * {lanes} + lane", False
             elif lanes and name in strided:
-                place = f"{take[1]} * {lanes}"
+                place = f"{take[1]} * {strided[name]}"
             text = name if name in by_value else f"{name}[{place}]"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))

@@ -1,4 +1,4 @@
-/* The ensembles' interface: one call integrates any number of members, BP_MEMBERS of them at a time.
+/* The ensembles' interface: one call integrates any number of members, BP_LANES of them at a time.
 
    Every member has its own parameters, segments, step sizes and method; a lane whose member is done takes the next one.  A member's numbers
    do not depend on its neighbours, so results are the same bits however members are spread over calls and threads.

@@ -1,6 +1,6 @@
 /* The model for a member of an ensemble in each SIMD lane; see model.h for one member.
 
-   Every array holds BP_MEMBERS values an entry, next to each other.  Lanes never look at each other: a member's arithmetic is the same
+   Every array holds BP_LANES values an entry, next to each other.  Lanes never look at each other: a member's arithmetic is the same
    whichever members are its neighbours. */
 #ifndef BALLPASS_LANE_MODEL_H
 #define BALLPASS_LANE_MODEL_H
@@ -9,7 +9,7 @@
 #include "model.h"
 #include "reductions.h"
 
-enum { BP_L = BP_MEMBERS };
+enum { BP_L = BP_LANES };
 
 #define BP_EACH_LANE _Pragma("omp simd") for (int lane = 0; lane < BP_L; lane++)
 #define BP_ALIGNED __attribute__((aligned(64)))

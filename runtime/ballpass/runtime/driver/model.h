@@ -29,7 +29,7 @@ typedef struct {
 #endif
 } bp_numbers;
 
-/* Cosines and sines of the stage's angles at the times t + nodes[i] h, i = 0 ... BP_LANES - 1, nodes within [0, 1].  An angle that turns by
+/* Cosines and sines of the stage's angles at the times t + nodes[i] h, i = 0 ... BP_AT_ONCE - 1, nodes within [0, 1].  An angle that turns by
    little is turned on from its value at t. */
 static inline __attribute__((always_inline)) void bp_directions(const bp_numbers *n, double t, double h, const double *restrict nodes,
                                                                 double *restrict C, double *restrict S)
@@ -43,56 +43,56 @@ static inline __attribute__((always_inline)) void bp_directions(const bp_numbers
         for (int k = 0; k < BP_NA; k++) {
             const double turn = rate[k] * h, c = c0[k], s = s0[k];
 #pragma omp simd
-            for (int i = 0; i < BP_LANES; i++) bp_turn(c, s, turn * nodes[i], &C[k * BP_LANES + i], &S[k * BP_LANES + i]);
+            for (int i = 0; i < BP_AT_ONCE; i++) bp_turn(c, s, turn * nodes[i], &C[k * BP_AT_ONCE + i], &S[k * BP_AT_ONCE + i]);
         }
     } else {
         for (int k = 0; k < BP_NA; k++) {
             const double turn = rate[k] * h, from = angle[k];
 #pragma omp simd
-            for (int i = 0; i < BP_LANES; i++) bp_sincos(from + turn * nodes[i], &S[k * BP_LANES + i], &C[k * BP_LANES + i]);
+            for (int i = 0; i < BP_AT_ONCE; i++) bp_sincos(from + turn * nodes[i], &S[k * BP_AT_ONCE + i], &C[k * BP_AT_ONCE + i]);
         }
     }
 }
 
-/* Up to BP_LANES nodes from the `first` of `count`, the last repeated. */
+/* Up to BP_AT_ONCE nodes from the `first` of `count`, the last repeated. */
 static inline __attribute__((always_inline)) void bp_some_nodes(const double *restrict nodes, const int first, const int count,
                                                                 double *restrict some)
 {
-    for (int i = 0; i < BP_LANES; i++) some[i] = nodes[first + i < count ? first + i : count - 1];
+    for (int i = 0; i < BP_AT_ONCE; i++) some[i] = nodes[first + i < count ? first + i : count - 1];
 }
 
 /* Stage variables at the times t + nodes[i] h, i = 0 ... count - 1, into the rows of w. */
 static inline __attribute__((always_inline)) void bp_stages(const bp_numbers *n, double t, double h, const double *restrict nodes,
                                                              const int count, double w[][BP_NW])
 {
-    for (int first = 0; first < count; first += BP_LANES) {
-        double some[BP_LANES], time[BP_LANES], C[BP_NA * BP_LANES], S[BP_NA * BP_LANES], lanes[BP_NW * BP_LANES];
+    for (int first = 0; first < count; first += BP_AT_ONCE) {
+        double some[BP_AT_ONCE], time[BP_AT_ONCE], C[BP_NA * BP_AT_ONCE], S[BP_NA * BP_AT_ONCE], lanes[BP_NW * BP_AT_ONCE];
         bp_some_nodes(nodes, first, count, some);
         bp_directions(n, t, h, some, C, S);
-        for (int i = 0; i < BP_LANES; i++) time[i] = t + some[i] * h;
+        for (int i = 0; i < BP_AT_ONCE; i++) time[i] = t + some[i] * h;
         bp_stage_turned_lanes(C, S, time, n->u, n->p, n->c, lanes);
-        for (int i = 0; i < BP_LANES && first + i < count; i++)
-            for (int k = 0; k < BP_NW; k++) w[first + i][k] = lanes[k * BP_LANES + i];
+        for (int i = 0; i < BP_AT_ONCE && first + i < count; i++)
+            for (int k = 0; k < BP_NW; k++) w[first + i][k] = lanes[k * BP_AT_ONCE + i];
     }
 }
 
-/* The same, and the stage variables and their time derivatives at t + h; count < BP_LANES. */
+/* The same, and the stage variables and their time derivatives at t + h; count < BP_AT_ONCE. */
 static inline __attribute__((always_inline)) void bp_stages_and_end(const bp_numbers *n, double t, double h, const double *restrict nodes,
                                                                      const int count, double w[][BP_NW], double *restrict end,
                                                                      double *restrict end_rate)
 {
-    double some[BP_LANES], time[BP_LANES], C[BP_NA * BP_LANES], S[BP_NA * BP_LANES], angle[BP_NA], rate[BP_NA];
-    double lanes[BP_NW * BP_LANES], rates[BP_NW * BP_LANES];
-    for (int i = 0; i < BP_LANES; i++) some[i] = i < count ? nodes[i] : 1.0;
+    double some[BP_AT_ONCE], time[BP_AT_ONCE], C[BP_NA * BP_AT_ONCE], S[BP_NA * BP_AT_ONCE], angle[BP_NA], rate[BP_NA];
+    double lanes[BP_NW * BP_AT_ONCE], rates[BP_NW * BP_AT_ONCE];
+    for (int i = 0; i < BP_AT_ONCE; i++) some[i] = i < count ? nodes[i] : 1.0;
     bp_directions(n, t, h, some, C, S);
     bp_angles(t, n->u, n->p, n->c, angle, rate);
-    for (int i = 0; i < BP_LANES; i++) time[i] = t + some[i] * h;
+    for (int i = 0; i < BP_AT_ONCE; i++) time[i] = t + some[i] * h;
     bp_stage_rate_turned_lanes(C, S, rate, time, n->u, n->p, n->c, lanes, rates);
     for (int i = 0; i < count; i++)
-        for (int k = 0; k < BP_NW; k++) w[i][k] = lanes[k * BP_LANES + i];
+        for (int k = 0; k < BP_NW; k++) w[i][k] = lanes[k * BP_AT_ONCE + i];
     for (int k = 0; k < BP_NW; k++) {
-        end[k] = lanes[k * BP_LANES + count];
-        end_rate[k] = rates[k * BP_LANES + count];
+        end[k] = lanes[k * BP_AT_ONCE + count];
+        end_rate[k] = rates[k * BP_AT_ONCE + count];
     }
 }
 

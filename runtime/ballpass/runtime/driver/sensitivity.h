@@ -38,9 +38,9 @@ typedef struct {
     double A[BP_NQ * BP_NQ * BP_LANES], B[BP_NQ * BP_NQ * BP_LANES], at[BP_NQ * BP_LANES];
 } bp_tangent_block;
 
-/* Derivatives of the stage variables by inputs, parameters and constants at stage times, BP_LANES times to a row. */
-enum { BP_TIMES = (BP_METHOD_STAGES + BP_LANES - 1) / BP_LANES };
-typedef double bp_stage_slopes[BP_TIMES][BP_NJ * BP_LANES];
+/* Derivatives of the stage variables by inputs, parameters and constants at stage times, BP_AT_ONCE times to a row. */
+enum { BP_TIMES = (BP_METHOD_STAGES + BP_AT_ONCE - 1) / BP_AT_ONCE };
+typedef double bp_stage_slopes[BP_TIMES][BP_NJ * BP_AT_ONCE];
 
 /* Common data of the directions at the stages of a step, and the slopes there that are differentiated. */
 typedef struct {
@@ -96,7 +96,7 @@ static inline void bp_tangent_stage(const bp_tangent_times *at, int time)
 {
     double td[BP_LANES];
     bp_moved_time(at->own, at->points->after[time], td);
-    bp_stage_moved_lanes(at->points->J[time / BP_LANES] + time % BP_LANES, td, at->d.u, at->d.p, at->d.c, at->own->w);
+    bp_stage_moved_lanes(at->points->J[time / BP_AT_ONCE] + time % BP_AT_ONCE, td, at->d.u, at->d.p, at->d.c, at->own->w);
 }
 
 static inline void bp_tangent_rate(const bp_tangent_times *at, int i, double pace, const double *restrict y, double *restrict k)
@@ -169,14 +169,14 @@ static inline void bp_sloped_stages(bp_step_points *points, const bp_numbers *n,
         points->after[i] = passed[i] * h;
         points->pace[i] = lead ? bp_pace(*lead, nodes[i]) : 1.0;
     }
-    for (int first = 0; first < count; first += BP_LANES) {
-        double some[BP_LANES], time[BP_LANES], C[BP_NA * BP_LANES], S[BP_NA * BP_LANES], lanes[BP_NW * BP_LANES];
+    for (int first = 0; first < count; first += BP_AT_ONCE) {
+        double some[BP_AT_ONCE], time[BP_AT_ONCE], C[BP_NA * BP_AT_ONCE], S[BP_NA * BP_AT_ONCE], lanes[BP_NW * BP_AT_ONCE];
         bp_some_nodes(passed, first, count, some);
         bp_directions(n, t, h, some, C, S);
-        for (int i = 0; i < BP_LANES; i++) time[i] = t + some[i] * h;
-        bp_stage_slopes_lanes(C, S, time, n->u, n->p, n->c, lanes, points->J[first / BP_LANES]);
-        for (int i = 0; i < BP_LANES && first + i < count; i++)
-            for (int k = 0; k < BP_NW; k++) points->w[first + i][k] = lanes[k * BP_LANES + i];
+        for (int i = 0; i < BP_AT_ONCE; i++) time[i] = t + some[i] * h;
+        bp_stage_slopes_lanes(C, S, time, n->u, n->p, n->c, lanes, points->J[first / BP_AT_ONCE]);
+        for (int i = 0; i < BP_AT_ONCE && first + i < count; i++)
+            for (int k = 0; k < BP_NW; k++) points->w[first + i][k] = lanes[k * BP_AT_ONCE + i];
     }
 }
 
