@@ -193,13 +193,12 @@ def test_a_driver_of_other_records_is_refused_before_it_is_called(
     driver, module = {
         "ballpass_ensemble_options": (model.ensemble_driver, ensemble_driver),
     }.get(name, (model.stepper, stepper))
-    library = model.ensemble_driver.stepper.library if driver is model.ensemble_driver else driver.library
-    type(driver)(library, model.manifest)
+    type(driver)(driver.library, model.manifest)
     monkeypatch.setattr(module, record.__name__, longer)
     with pytest.raises(
         ArtefactError, match=f"{ctypes.sizeof(record)}.* bytes there, and .*{ctypes.sizeof(longer)}.*again"
     ):
-        type(driver)(library, model.manifest)
+        type(driver)(driver.library, model.manifest)
 
 
 def test_results_of_ensembles_have_the_layout_of_those_of_single_runs() -> None:

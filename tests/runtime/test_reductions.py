@@ -15,31 +15,18 @@ from press_laws import LAWS, press
 from quick_cases import long_but
 
 from ballpass.runtime import Model, RequestError, SimulationError, Solution
-from ballpass.runtime.native.driver_library import PLAIN
 from ballpass.runtime.run.reductions import Reduction, Reductions, joined
 
 ModelMaker = Callable[..., Model]
 BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
 
 
-@pytest.fixture
-def one_library(monkeypatch: pytest.MonkeyPatch) -> Callable[[Model], Model]:
-    """Lets `simulate` run the driver that `reduce` runs: two compilations may round a sum over the balls differently,
-    and a force that jumps makes that a different motion within the tolerance."""
-
-    def share(model: Model) -> Model:
-        monkeypatch.setitem(model._drivers, PLAIN, model.ensemble_driver.stepper)
-        return model
-
-    return share
-
-
 @pytest.mark.parametrize("method", ["stepper-dp54", "stepper-dop853", "stepper-rodas4", "stepper-rodas5p"])
 @pytest.mark.parametrize("law", ["one-sided", pytest.param("one-sided-gated", marks=pytest.mark.long)])
 def test_reductions_equal_those_of_fifty_thousand_samples_a_cycle(
-    make_model: ModelMaker, one_library: Callable[[Model], Model], law: str, method: str
+    make_model: ModelMaker, law: str, method: str
 ) -> None:
-    model = one_library(press(make_model, law))
+    model = press(make_model, law)
     # the same steps: what differs is that samples miss the top of a peak, by half their distance at most
     found = model.reduce(cycles=1.5, transient=1, method=method, rtol=3e-7)
     samples = model.simulate(cycles=1.5, transient=1, method=method, rtol=3e-7, samples_per_cycle=50_000).steady()
@@ -259,8 +246,8 @@ def test_means_of_parts_of_a_run_add_up_to_that_of_the_whole(make_model: ModelMa
         assert max(head[name].maximum, tail[name].maximum) == pytest.approx(whole[name].maximum, abs=1e-4 * scale)
 
 
-def test_reductions_do_not_change_the_run(make_model: ModelMaker, one_library: Callable[[Model], Model]) -> None:
-    model = one_library(press(make_model, "one-sided"))
+def test_reductions_do_not_change_the_run(make_model: ModelMaker) -> None:
+    model = press(make_model, "one-sided")
     found = model.reduce(cycles=2, transient=1)
     run = model.simulate(cycles=2, method="stepper", samples_per_cycle=10)
     assert [found.end[name] for name in model.states] == run.x[-1].tolist()

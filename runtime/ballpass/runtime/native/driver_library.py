@@ -72,10 +72,10 @@ LOCATING = DriverSources(
     kind="locating", headers=(*_REDUCTIONS, SWITCHES), flags=("-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
 )
 
-#: Driver of ensembles, with that of single runs.
+#: Driver of ensembles, without that of single runs.
 ENSEMBLE = DriverSources(
     kind="ensemble",
-    sources=("stepper.c", "ensemble.c", "member_schedule.c", "schedule.c"),
+    sources=("ensemble.c", "member_schedule.c", "schedule.c"),
     headers=_REDUCTIONS,
     flags=("-DBALLPASS_REDUCTIONS",),
 )

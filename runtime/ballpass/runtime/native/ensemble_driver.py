@@ -88,11 +88,11 @@ class Carried:
 
 
 class EnsembleDriver:
-    """The compiled drivers of one model.
+    """The compiled driver of a model's ensembles.
 
     Attributes
     ----------
-    stepper : driver of single runs, with reductions
+    stepper : driver of single runs, with reductions, by `with_stepper`
     rows : layout of the reductions
     lanes : members that advance together
     schedule : segments of many members
@@ -103,8 +103,9 @@ class EnsembleDriver:
         The library's sizes are not those of the manifest or of this module.
     """
 
+    stepper: Stepper
+
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
-        self.stepper = Stepper(library, manifest)
         self.rows = reduction_rows(manifest)
         code, (row, channels, self.lanes) = open_driver(
             library, "ballpass_ensemble_sizes", 3, (_EnsembleOptions, *SCHEDULE_RECORDS)
@@ -112,7 +113,7 @@ class EnsembleDriver:
         expected = (self.rows.size, len(self.rows.channels))
         check_sizes(library, "numbers of a reduction and channels", (row, channels), expected)
         self._inputs = input_columns(manifest)
-        self._code = code
+        self.library, self._code = library, code
         self.schedule = MemberSchedule(code, manifest)
         integer, long = ctypes.c_int, ctypes.c_long
         states = (DOUBLES, DOUBLES, DOUBLES)
@@ -124,7 +125,7 @@ class EnsembleDriver:
         declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *results)
 
     def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
-        """The same with another driver of single runs, which must have reductions."""
+        """The same with a driver of single runs, which must have reductions."""
         found = copy.copy(self)
         found.stepper = stepper
         return found
