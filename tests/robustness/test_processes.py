@@ -475,6 +475,7 @@ def test_a_compiler_whose_child_hangs_is_stopped_with_its_child(
     compiler = wrapper(tmp_path, f"sleep 600 &\necho $! > {note}.new && mv {note}.new {note}\nwait")
     for patience in (0.3, 3.0, 30.0):  # until it has come so far as to start its child
         monkeypatch.setattr(compilers, "TIMEOUT", patience)
+        monkeypatch.setattr(os, "getloadavg", lambda: (0.1, 0.1, 0.1))
         said = rf"(?s)did not finish within {patience:g} s.*Nothing was written.*set CC"
         begun = time.perf_counter()
         with pytest.raises(CompileError, match=said) as caught:
@@ -485,6 +486,15 @@ def test_a_compiler_whose_child_hangs_is_stopped_with_its_child(
             break
     assert gone(int(note.read_text()))
     assert not list(cache.iterdir())
+
+
+def test_a_compiler_has_longer_on_a_busy_machine(
+    cache: Path, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compilers, "TIMEOUT", 0.1)
+    monkeypatch.setattr(os, "getloadavg", lambda: (4.0 * (os.cpu_count() or 1), 0.0, 0.0))
+    with pytest.raises(CompileError, match=r"(?s)within 0\.4 s, 4 times as long as on an idle machine.*less else runs"):
+        compiling.compile_sources((source,), wrapper(tmp_path, "sleep 60"))
 
 
 def test_a_compiler_that_does_not_tell_its_version_is_refused_in_words(

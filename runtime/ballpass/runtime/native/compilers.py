@@ -29,7 +29,7 @@ from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
 #: on the processor.  -fno-math-errno: square roots without a branch for errno; outputs take a sixth less.
 FLAGS = ("-O1", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off", "-fno-math-errno")
 
-#: Longest a compiler may take [s]; a generated file takes about one second, ten with a cold ziglang.
+#: Longest a compiler may take on an idle machine [s]; a generated file takes about one second, ten with a cold ziglang.
 TIMEOUT = 300.0
 
 #: Longest a compiler may take to tell its version [s].
@@ -151,12 +151,15 @@ def run_compiler(command: tuple[str, ...], folder: Path, shown: str) -> None:
     CompileError
         It failed, took too long or cannot be run; with command and output.
     """
+    # of processor time, as far as other work leaves it
+    busy = max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0) if hasattr(os, "getloadavg") else 1.0
     try:
-        done = _finish(command, folder, TIMEOUT)
+        done = _finish(command, folder, TIMEOUT * busy)
     except subprocess.TimeoutExpired as fault:
+        others = f", {busy:.2g} times as long as on an idle machine" * (busy > 1.0)
         raise CompileError(
-            f"The C compiler did not finish within {TIMEOUT:g} s.\n  {shown}\nNothing was written. Try another "
-            "compiler: set CC."
+            f"The C compiler did not finish within {TIMEOUT * busy:.3g} s{others}.\n  {shown}\nNothing was written. "
+            "Wait until less else runs, or take a faster compiler: set CC, to gcc or clang in place of ziglang."
         ) from fault
     except OSError as fault:
         raise CompileError(
