@@ -12,7 +12,8 @@ parameters can be changed on its command line and the numbers are those of the m
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
@@ -30,6 +31,7 @@ from ballpass.runtime.export.scene_numbers import (
     scene_header,
     scene_source,
 )
+from ballpass.runtime.export.targets import TARGETS, cross_compiled, targets_of
 from ballpass.runtime.native.compile import digests_of
 from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
@@ -40,6 +42,9 @@ from ballpass.runtime.request.locating import has_kinks
 #: Flags of the compiler for a shared library, or replaced here.
 _LIBRARY_ONLY = ("-O1", "-fPIC", "-shared")
 
+#: Flags of the program, for any processor of a kind.
+PROGRAM_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRARY_ONLY), *FLAGS[1:])
+
 #: Flags of a library for any processor of a kind.
 LIBRARY_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag != "-O1"), *FLAGS[1:], "-fvisibility=hidden")
 
@@ -49,7 +54,14 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 _LEFT_OUT = re.compile(r'^#ifdef BALLPASS_(?:SENSITIVITIES|REDUCTIONS)\n(?:#include "[^"]+"\n)+#endif\n', re.MULTILINE)
 
 
-def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None = None) -> Path:
+def export_c(
+    folder: str | Path,
+    out: str | Path,
+    *,
+    manifest: Manifest | None = None,
+    targets: Sequence[str] = (),
+    progress: Callable[[str], object] = str,
+) -> Path:
     """Write the stand-alone C program of a generated folder.
 
     Parameters
@@ -57,6 +69,8 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     folder : what `ballpass derive` wrote
     out : folder to write; files of an earlier export are replaced, others stay
     manifest : of the folder, where it was read before: the numbers are its own then
+    targets : systems that the program is compiled for, as for `ballpass.runtime.export.targets.targets_of`
+    progress : called with what is done next
 
     Returns
     -------
@@ -68,9 +82,11 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
         The generated folder is missing, edited or without kernels.
     RequestError
         The model has no states, so that there is nothing to integrate, or the stepper does not take it; or the folder
-        holds files of these names that are no earlier export.
+        holds files of these names that are no earlier export; an unknown target, or no compiler for it.
+    CompileError
+        The compiler failed.
     """
-    place, target = Path(folder).absolute(), Path(out)
+    place, target, others = Path(folder).absolute(), Path(out), targets_of(targets)
     manifest = read_artefact(place) if manifest is None else manifest
     texts = program_texts(started(place, manifest))
     target.mkdir(parents=True, exist_ok=True)
@@ -83,6 +99,15 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
         )
     for name, text in texts.items():
         replace_file(target / name, text.encode())
+    sources = [name for name in sorted(texts) if name.endswith(".c") and name != "example.c"]
+    for other in others:
+        progress(f"compiling for {other}")
+        program = f"{_program(manifest)}-{other}{TARGETS[other].program}"
+        with tempfile.TemporaryDirectory() as made:
+            for name, text in texts.items():
+                (Path(made) / name).write_text(text, encoding="utf-8", newline="\n")
+            replace_file(target / program, cross_compiled(Path(made), other, PROGRAM_FLAGS, sources, program))
+        (target / program).chmod(0o755)
     return target
 
 
@@ -155,11 +180,10 @@ def _with_includes(source: Path, generated: Mapping[Path, str], known: Iterable[
 
 
 def _makefile(manifest: Manifest, sources: Sequence[str], headers: Sequence[str]) -> str:
-    flags = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRARY_ONLY), *FLAGS[1:])
     return filled(
         STANDALONE / "Makefile.in",
         PROGRAM=_program(manifest),
-        FLAGS=" ".join(flags),
+        FLAGS=" ".join(PROGRAM_FLAGS),
         OBJECTS=" ".join(source.removesuffix(".c") + ".o" for source in sources),
         HEADERS=" ".join(headers),
     )

@@ -1,10 +1,11 @@
-"""From a generated folder to an FMU 3.0 for co-simulation, which runs without Python.
+"""From a generated folder to an FMU 3.0 or 2.0 for co-simulation, which runs without Python.
 
-In: a generated folder, names of parameters that become inputs.  Out: a file ``.fmu``: the library compiled for this
-machine, its sources, ``modelDescription.xml`` (`ballpass.runtime.export.model_description`), a page and the licences.
+In: a generated folder, names of parameters that become inputs, other systems to compile for.  Out: a file ``.fmu``:
+the libraries, their sources, ``modelDescription.xml`` (`ballpass.runtime.export.model_description`), a page and the
+licences.
 
 The FMU is the exported program (`ballpass.runtime.export.c_program`) as a library, with ``driver/fmi/fmi.c`` over its
-interface ``ballpass.h``.
+interface ``ballpass.h``, and ``fmi2.c`` over that for FMI 2.0.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ import hashlib
 import html
 import platform
 import re
+import struct
 import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import accumulate, chain
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -32,6 +34,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
+from ballpass.runtime.export.fmi2_description import fmi2_description
 from ballpass.runtime.export.model_description import (
     SPEED,
     build_description,
@@ -46,6 +49,7 @@ from ballpass.runtime.export.scene_numbers import (
     speed_table,
     varying,
 )
+from ballpass.runtime.export.targets import TARGETS, cross_compiled, targets_of
 from ballpass.runtime.native.compile import library_suffix
 from ballpass.runtime.native.compilers import need_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
@@ -60,12 +64,25 @@ FMI = DRIVER / "fmi"
 #: Files of the program that an FMU does not need.
 _PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
 
+#: Of the FMI.
+VERSIONS = (2, 3)
+
+#: Folders of binaries by the names of FMI 3.0, where FMI 2.0 has others; it has no name for Linux on arm64.
+_FMI2_FOLDERS = {"x86_64-linux": "linux64", "x86_64-windows": "win64"}
+
 #: Time stamp of the files in the archive, so that the same scene gives the same bytes.
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def export_fmu(
-    folder: str | Path, out: str | Path, *, inputs: Sequence[str] = (), manifest: Manifest | None = None
+    folder: str | Path,
+    out: str | Path,
+    *,
+    inputs: Sequence[str] = (),
+    manifest: Manifest | None = None,
+    version: int = 3,
+    targets: Sequence[str] = (),
+    progress: Callable[[str], object] = str,
 ) -> Path:
     """Write the FMU of a generated folder.
 
@@ -75,6 +92,9 @@ def export_fmu(
     out : file to write; replaced if it is there
     inputs : parameters that become inputs, or prefixes of their names: ``"mechanism.forces.punch"``
     manifest : of the folder, where it was read before: the numbers are its own then
+    version : of the FMI, 3 or 2
+    targets : systems to compile for besides this machine, as for `ballpass.runtime.export.targets.targets_of`
+    progress : called with what is done next
 
     Returns
     -------
@@ -83,29 +103,36 @@ def export_fmu(
     Raises
     ------
     ArtefactError, RequestError
-        As for `ballpass.runtime.export.c_program.export_c`; a name that cannot be an input; no compiler.
+        As for `ballpass.runtime.export.c_program.export_c`; a version or target that is none; a name that cannot be an
+        input; no compiler.
     CompileError
         The compiler failed.
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
+    if version not in VERSIONS:
+        raise RequestError(f"FMI {version} was asked for. Allowed: {' or '.join(map(str, VERSIONS))}.")
     chosen = input_names(manifest, inputs)
+    others = targets_of(targets)
     model = started(place, manifest)
     manifest = model.manifest
     sources = {name: text for name, text in program_texts(model).items() if name not in _PROGRAM_ONLY}
-    sources |= _interface(model)
+    sources |= _interface(model, version)
     token = _token(manifest, chosen, sources)
-    sources["fmu.h"] = _fmu_header(manifest, token, chosen)
+    sources["fmu.h"] = _fmu_header(manifest, token, chosen, version)
     identifier = model_identifier(manifest)
     description = model_description(manifest, identifier, token, chosen, dependencies(model), _magnitudes(model))
+    if version == 2:
+        description = fmi2_description(description, _units_of(sources))
     files = {
         "modelDescription.xml": _xml(description),
-        "sources/buildDescription.xml": _xml(build_description(identifier, sources)),
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
-        "documentation/index.html": _page(manifest, chosen).encode(),
+        "documentation/index.html": _page(manifest, chosen, version).encode(),
         "documentation/licenses/license.txt": (FMI / "license.txt").read_bytes(),
-        f"binaries/{platform_tuple()}/{identifier}{library_suffix()}": _compiled(sources, identifier),
+        **_binaries(sources, identifier, version, others, progress),
     }
+    if version == 3:
+        files["sources/buildDescription.xml"] = _xml(build_description(identifier, _units_of(sources)))
     target.parent.mkdir(parents=True, exist_ok=True)
     with replaced(target) as made, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(files):
@@ -166,9 +193,10 @@ def platform_tuple() -> str:
     return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64', 'i386': 'x86', 'i686': 'x86'}.get(machine, machine) }-{system}"
 
 
-def _interface(model: LoadedModel) -> dict[str, str]:
+def _interface(model: LoadedModel, version: int) -> dict[str, str]:
     """Sources of the interface: those that are the same for all scenes, and derivatives of this one."""
-    texts = {path.name: path.read_text(encoding="utf-8") for path in sorted(FMI.glob("*.[ch]"))}
+    paths = [path for path in sorted(FMI.glob("*.[ch]")) if version == 2 or path.stem != "fmi2"]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in paths}
     constants, moved = _tangents(model)
     along = tuple((f"const double *d{name}", f"d{name}") for name in "txupc")
     own = (("const double *p", "p"), ("const double *dp", "dp"))
@@ -205,11 +233,15 @@ def _token(manifest: Manifest, inputs: Sequence[str], sources: Mapping[str, str]
     return f"{{{uuid.UUID(digest[:32])}}}"
 
 
-def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
-    first, ends = 0, []
-    for info in computed_outputs(manifest):
-        first += info.size
-        ends.append(first)
+def _units_of(sources: Iterable[str]) -> list[str]:
+    """The C files to compile: fmi2.c includes fmi.c."""
+    return [name for name in sorted(sources) if name.endswith(".c") and not (name == "fmi.c" and "fmi2.c" in sources)]
+
+
+def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str], version: int) -> str:
+    sizes = [info.size for info in computed_outputs(manifest)]
+    # FMI 2.0 has no arrays: each number is a variable
+    ends = [*accumulate(sizes)] if version == 3 else [*range(1, sum(sizes) + 1)]
     speeds, times = speed_table(manifest) if SPEED in inputs else ((), ())
     names = [info.name for info in manifest.parameters]
     table = ", ".join(str(names.index(name)) for name in (*speeds, *times)) or "0"
@@ -225,19 +257,60 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
     )
 
 
-def _compiled(sources: Mapping[str, str], identifier: str) -> bytes:
-    """The shared library, for any processor of this machine's kind."""
+def _binaries(
+    sources: Mapping[str, str],
+    identifier: str,
+    version: int,
+    targets: Sequence[str],
+    progress: Callable[[str], object],
+) -> dict[str, bytes]:
+    """Shared libraries by their paths in the FMU: for any processor of this machine's kind, and for other kinds."""
     compiler = need_compiler("An FMU, which holds compiled code,")
-    names = sorted(name for name in sources if name.endswith(".c"))
-    own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
+    names, found, here = _units_of(sources), dict[str, bytes](), platform_tuple()
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         for name, text in sources.items():
             (place / name).write_text(text, encoding="utf-8", newline="\n")
         made = f"{identifier}{library_suffix()}"
+        own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
         command = (*compiler.command, *LIBRARY_FLAGS, *names, *own, "-o", made, "-lm")
         run_compiler(command, place, " ".join(command))
-        return (place / made).read_bytes()
+        found[f"{here}/{made}"] = (place / made).read_bytes()
+        for other in targets:
+            target = TARGETS[other]
+            if target.place == here:
+                continue
+            progress(f"compiling for {other}")
+            made = f"{identifier}{target.library}"
+            flags = [flag for flag in LIBRARY_FLAGS if flag != "-fPIC" or target.library != ".dll"]
+            flags += ["-s"]  # without the paths of files here
+            flags += ["-Wl,-Bsymbolic"] if target.library == ".so" else []
+            found[f"{target.place}/{made}"] = cross_compiled(place, other, flags, names, made)
+    if version == 3:
+        return {f"binaries/{path}": content for path, content in found.items()}
+    macos = f"{identifier}.dylib"
+    slices = {kind: found.pop(f"{kind}-darwin/{macos}", b"") for kind in ("x86_64", "aarch64")}
+    if any(slices.values()):
+        found[f"darwin64/{macos}"] = universal({kind: content for kind, content in slices.items() if content})
+    parts = [(*path.split("/"), path) for path in found]
+    return {f"binaries/{_FMI2_FOLDERS.get(place, place)}/{name}": found[path] for place, name, path in parts}
+
+
+def universal(slices: Mapping[str, bytes]) -> bytes:
+    """One library of macOS for several processors, as `lipo` makes them: FMI 2.0 has one folder for all.
+
+    Parameters
+    ----------
+    slices : libraries by processor
+    """
+    kinds = {"x86_64": (0x01000007, 3), "aarch64": (0x0100000C, 0)}
+    align = 14  # pages of 16 KiB
+    head, body = struct.pack(">II", 0xCAFEBABE, len(slices)), b""
+    for kind, content in slices.items():
+        body += bytes(-len(body) % (1 << align))
+        head += struct.pack(">IIIII", *kinds[kind], (1 << align) + len(body), len(content), align)
+        body += content
+    return head + bytes((1 << align) - len(head)) + body
 
 
 def _xml(root: Xml.Element) -> bytes:
@@ -245,7 +318,7 @@ def _xml(root: Xml.Element) -> bytes:
     return bytes(Xml.tostring(root, encoding="UTF-8", xml_declaration=True)) + b"\n"
 
 
-def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
+def _page(manifest: Manifest, inputs: Sequence[str], version: int) -> str:
     """The page that describes the FMU."""
 
     def rows(names: Sequence[tuple[str, str, str]]) -> str:
@@ -259,6 +332,7 @@ def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
     return filled(
         FMI / "index.html.in",
         TITLE=html.escape(manifest.title),
+        VERSION=f"{version}.0",
         INPUTS=rows([row for row in parameters if row[0] in inputs]),
         OUTPUTS=rows(outputs),
         PARAMETERS=rows([row for row in parameters if row[0] not in inputs]),

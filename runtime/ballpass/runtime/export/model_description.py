@@ -203,13 +203,12 @@ def initial_speed(manifest: Manifest) -> float:
 
 
 def build_description(identifier: str, sources: Iterable[str]) -> Xml.Element:
-    """Tree of ``sources/buildDescription.xml``."""
+    """Tree of ``sources/buildDescription.xml``; `sources` are the C files."""
     root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
     build = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     flags = " ".join(flag for flag in LIBRARY_FLAGS if flag not in ("-fPIC", "-shared", "-std=c99"))
     files = Xml.SubElement(build, "SourceFileSet", language="C99", compiler="gcc", compilerOptions=flags)
-    for name in sorted(sources):
-        if name.endswith(".c"):
-            Xml.SubElement(files, "SourceFile", name=name)
+    for name in sources:
+        Xml.SubElement(files, "SourceFile", name=name)
     Xml.SubElement(build, "Library", name="m")
     return root

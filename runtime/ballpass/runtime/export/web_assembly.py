@@ -5,19 +5,15 @@ In: a generated folder's model.  Out: bytes of the module.  ``ballpass.h`` is it
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 import tempfile
 from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.c_program import program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind, moment_symbols
-from ballpass.runtime.native.compilers import run_compiler
+from ballpass.runtime.native.compilers import ZIG, need_zig, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
@@ -44,12 +40,7 @@ _FLAGS = (
 
 def check_compiler() -> None:
     """Refuse with a `RequestError` where the compiler for WebAssembly is missing."""
-    if importlib.util.find_spec("ziglang") is None:
-        target = "ballpass[compiler]" if can_derive() else "ziglang"
-        raise RequestError(
-            "A page with the solver in it needs a compiler for WebAssembly, ziglang, which is not installed; gcc and "
-            f'clang of a system do not bring its libraries. Install it from PyPI: pip install "{target}".'
-        )
+    need_zig("A page with the solver in it")
 
 
 def web_assembly(model: LoadedModel) -> bytes:
@@ -76,7 +67,7 @@ def web_assembly(model: LoadedModel) -> bytes:
         for file, text in texts.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
         sources = sorted(file for file in texts if file.endswith(".c"))
-        command = (sys.executable, "-m", "ziglang", "cc", *_FLAGS, *sources, "-o", "model.wasm")
+        command = (*ZIG, *_FLAGS, *sources, "-o", "model.wasm")
         run_compiler(command, folder, " ".join(("python -m ziglang cc", *_FLAGS, *sources, "-o model.wasm")))
         return (folder / "model.wasm").read_bytes()
 

@@ -22,12 +22,15 @@ from pathlib import Path
 from types import FrameType
 
 from ballpass.runtime.contract.errors import CompileError, RequestError
-from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER
+from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER, can_derive, is_installed
 
 #: -O1: straight-line code runs as fast as with -O2 and compiles in half to a third of the time; the stepper's driver
 #: asks for more.  -ffp-contract=off: the same bits with and without fused multiply-add, so that results do not depend
 #: on the processor.  -fno-math-errno: square roots without a branch for errno; outputs take a sixth less.
 FLAGS = ("-O1", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off", "-fno-math-errno")
+
+#: ziglang's compiler, which compiles for other machines as well.
+ZIG = (sys.executable, "-m", "ziglang", "cc")
 
 #: Longest a compiler may take on an idle machine [s]; a generated file takes about one second, ten with a cold ziglang.
 TIMEOUT = 300.0
@@ -80,10 +83,10 @@ def find_compiler(command: str | None = None) -> Compiler | None:
         path = shutil.which(name)
         if path is not None:
             return _describe((path,))
-    if importlib.util.find_spec("ziglang") is not None:
+    if is_installed("ziglang"):
         # zig compiles for the processor at hand by itself
         return Compiler(
-            command=(sys.executable, "-m", "ziglang", "cc"),
+            command=ZIG,
             flags=FLAGS,
             identity=f"ziglang {importlib.metadata.version('ziglang')}",
         )
@@ -106,6 +109,21 @@ def need_compiler(what: str) -> Compiler:
     if found is None:
         raise RequestError(without_compiler(what))
     return found
+
+
+def need_zig(what: str) -> None:
+    """Refuse with a `RequestError` where ziglang is missing.
+
+    Parameters
+    ----------
+    what : what needs it, in words
+    """
+    if not is_installed("ziglang"):
+        target = "ballpass[compiler]" if can_derive() else "ziglang"
+        raise RequestError(
+            f"{what} needs a compiler for other systems, ziglang, which is not installed; gcc and clang of a system do "
+            f'not bring their libraries. Install it from PyPI: pip install "{target}".'
+        )
 
 
 def without_compiler(what: str) -> str:

@@ -27,16 +27,24 @@ from ballpass.runtime.app.commands.shared import (
     warn_of_scene,
 )
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.export.model_description import SPEED
+from ballpass.runtime.export.targets import TARGETS
 
 
 def export(
     scene: options.SceneOrFolder,
     c: Annotated[bool, Option(words="A C99 program with the model, the stepper, a Makefile and a main.")] = False,
-    fmu: Annotated[bool, Option(words="An FMU 3.0 for co-simulation, compiled for this machine.")] = False,
+    fmu: Annotated[
+        bool,
+        Option(words="An FMU for co-simulation, compiled for this machine and, with ziglang, for others."),
+    ] = False,
+    fmi: Annotated[
+        int | None, Option(shown="VERSION", words="Write an FMU of this version of the FMI, 2 or 3; 3 if not given.")
+    ] = None,
     inputs: Annotated[
         list[str] | None,
         Option(
@@ -46,6 +54,14 @@ def export(
             flags=("--input",),
         ),
     ] = None,
+    target: Annotated[
+        list[str] | None,
+        Option(
+            shown="SYSTEM",
+            words="Compile for this system too: `linux`, `windows`, `macos`, or one kind of machines of it such as "
+            "`linux-arm64`. Needs ziglang, the extra `compiler`. May be repeated. An FMU is for all if not given.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         Option(shown="PATH", words="Folder or FMU to write; `export/<scene>`, `export/<scene>.fmu` if not given."),
@@ -53,20 +69,19 @@ def export(
 ) -> None:
     """Write a scene as a program in C or as an FMU, which run without Python."""
     with command(scene) as stages:
+        fmu = fmu or fmi is not None
         if c == fmu:
             given = "both formats were" if c else "no format was"
-            raise RequestError(f"export: {given} given. Allowed: --c, a program in C99, or --fmu, an FMU 3.0.")
+            raise RequestError(f"export: {given} given. Allowed: --c, a program in C99, or --fmu, an FMU.")
         if inputs and not fmu:
             raise RequestError("export: --input is for --fmu. Values of the C program are set by its interface.")
         stages("reading the scene")
-        target = out if out is not None else Path("export") / (f"{name_of(scene)}.fmu" if fmu else name_of(scene))
-        check_folder(target.parent if fmu else target)
-        if fmu and target.is_dir():
-            raise RequestError(f"--out {target}: this is a folder. Name the FMU to write, as in export/press.fmu.")
-        if fmu and target.suffix != ".fmu":
-            raise RequestError(
-                f"--out {target}: importers take an FMU by its ending. Allowed: a name that ends in .fmu."
-            )
+        path = out if out is not None else Path("export") / (f"{name_of(scene)}.fmu" if fmu else name_of(scene))
+        check_folder(path.parent if fmu else path)
+        if fmu and path.is_dir():
+            raise RequestError(f"--out {path}: this is a folder. Name the FMU to write, as in export/press.fmu.")
+        if fmu and path.suffix != ".fmu":
+            raise RequestError(f"--out {path}: importers take an FMU by its ending. Allowed: a name that ends in .fmu.")
         if fmu:
             from ballpass.runtime.native.compilers import need_compiler
 
@@ -89,15 +104,19 @@ def export(
             if fmu:
                 from ballpass.runtime.export.fmu import export_fmu
 
-                export_fmu(folder, target, inputs=chosen, manifest=manifest)
+                systems = ([*TARGETS] if is_installed("ziglang") else []) if target is None else target
+                version = 3 if fmi is None else fmi
+                export_fmu(
+                    *(folder, path), inputs=chosen, manifest=manifest, version=version, targets=systems, progress=stages
+                )
             else:
                 from ballpass.runtime.export.c_program import export_c
 
-                export_c(folder, target, manifest=manifest)
+                export_c(folder, path, manifest=manifest, targets=target or (), progress=stages)
         warn_of_scene(manifest)
-    typer.echo(str(target))
+    typer.echo(str(path))
     if c:
-        place = shlex.quote(str(target))
+        place = shlex.quote(str(path))
         note(f"a program in C99, described in its README.md. make -C {place} run builds it and writes {place}/out.csv.")
 
 

@@ -473,7 +473,7 @@ fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
     instance_of *at = in(instance, ANY, "fmi3SetFMUState");
     const kept_head *kept = FMUState;
     if (!at) return fmi3Error;
-    if (!kept) return fail(at, "fmi3SetFMUState: no state was given. Allowed: one of fmi3GetFMUState.");
+    if (!kept) return fail(at, "fmi3SetFMUState: no state was given. Allowed: one that this FMU has given.");
     at->own = kept->own;
     return answered(at, "fmi3SetFMUState", ballpass_restore(at->simulation, kept + 1, ballpass_state_size()));
 }
@@ -491,7 +491,7 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUSta
 {
     instance_of *at = in(instance, ANY, "fmi3SerializedFMUStateSize");
     if (!at) return fmi3Error;
-    if (!FMUState) return fail(at, "fmi3SerializedFMUStateSize: no state was given. Allowed: one of fmi3GetFMUState.");
+    if (!FMUState) return fail(at, "fmi3SerializedFMUStateSize: no state was given. Allowed: one that this FMU has given.");
     *size = kept_size();
     return fmi3OK;
 }
