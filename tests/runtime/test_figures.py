@@ -23,7 +23,7 @@ from matplotlib.text import Annotation, Text
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot import CAPTIONS, NAMES, bearing
+from ballpass.runtime.plot import CAPTIONS, NAMES, bearing, on_paper
 from ballpass.runtime.plot.animation import choose_frames, to_plain
 from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
@@ -106,6 +106,34 @@ def test_vector_figures_are_the_same_bytes_each_time(press: Run, tmp_path: Path,
     assert files[0].startswith(head)
     assert b"Date>" not in files[0]
     assert b"CreationDate" not in files[0]
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", pytest.param("pdf", marks=pytest.mark.long)])
+def test_figures_for_a_paper_have_its_width_and_letters_of_seven_points(press: Run, tmp_path: Path, kind: str) -> None:
+    """Read from the files; letters are letters, and no title, label or legend leaves the picture."""
+    with on_paper(0.09, titles=False):
+        figure = draw("orbit", *press)
+        (path, page) = write_figures([("orbit", figure)], tmp_path, (kind,), CAPTIONS)
+    assert "**Orbit of the inner ring's centre.**" in page.read_text(encoding="utf-8")
+    data, points = path.read_bytes(), 90.0 / 25.4 * 72.0
+    if kind == "png":
+        assert struct.unpack(">I", data[16:20])[0] == pytest.approx(90.0 / 25.4 * 300, abs=1.0)
+        assert struct.unpack(">I", data[data.index(b"pHYs") + 4 :][:4])[0] == pytest.approx(300 / 0.0254, abs=1.0)
+    elif kind == "svg":
+        assert float(re.search(rb'width="([\d.]+)pt"', data)[1]) == pytest.approx(points, rel=1e-5)
+        box = float(re.search(rb'viewBox="0 0 ([\d.]+)', data)[1])
+        assert b">in the</tspan>" in data or b">in the</text>" in data
+        assert 9.5 * points / box == pytest.approx(7.0)
+    else:
+        assert float(re.search(rb"/MediaBox \[ 0 0 ([\d.]+)", data)[1]) == pytest.approx(points, rel=1e-6)
+        assert b"/Type3" not in data
+    assert "Orbit" not in texts(figure).replace(caption_of(figure), "")
+    figure.draw_without_rendering()
+    labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, *axes.texts)]
+    for part in (*labels, *figure.legends):
+        box = part.get_window_extent()
+        assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.width
+        assert 0.0 <= box.y0 <= box.y1 <= figure.bbox.height
 
 
 def test_captions_stand_beside_the_pictures(press: Run, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ballpass.runtime.plot import PAPER
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.style import (
     FIRST,
@@ -155,7 +156,7 @@ def ball_loads(record: Record) -> Figure:
     if closer:
         grid[-1, 1].set_xlim(*moment)
         grid[-1, 1].set_xlabel(label)
-    figure.supylabel("contact load [N]", fontsize=9.5, x=0.008)
+    figure.supylabel("contact load [N]", fontsize=9.5, **({"x": 0.008} if PAPER.get()[0] is None else {}))
     shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
     shaded = " Shaded: an applied load acts." if windows else ""
     right = " Right: around the highest load." if closer else ""

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.peaks import refine_peak
+from ballpass.runtime.plot import PAPER
 from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import Record
@@ -22,10 +23,13 @@ def peak_moment(record: Record) -> Figure:
     with_mechanism = record.manifest.mechanism is not None
     with_bearing = record.can_draw_bearing
     sample, reason = _moment(record)
-    figure = new_figure(5.6, layout=None)
+    both, on_paper = with_mechanism and with_bearing, PAPER.get()[0] is not None
+    figure = new_figure(10.0 if both and on_paper else 5.6, layout=None)
+    figure.set_layout_engine("none")  # axes of equal scales would become small
     text = ""
-    if with_mechanism and with_bearing:
-        left, right = figure.subplots(1, 2, width_ratios=(0.8, 1.0))
+    if both:
+        # in a column of a paper one above the other
+        left, right = figure.subplots(2, 1) if on_paper else figure.subplots(1, 2, width_ratios=(0.8, 1.0))
         draw_mechanism(left, record, sample)
         factor = draw_bearing(right, record, sample)
     elif with_bearing:
@@ -40,7 +44,7 @@ def peak_moment(record: Record) -> Figure:
         if record.has("drive_torque"):
             words += ", torque of the drive (arc)"
         words += ", dashed paths of joints and points. "
-        text += f"Left: {words}" if with_bearing else words.capitalize()
+        text += f"{'Above' if on_paper else 'Left'}: {words}" if with_bearing else words.capitalize()
     if with_bearing:
         words, _ = record.ball_force()
         text += f"Bearing: {record.noun}s coloured by {words}; clearance and displacement between the rings ×{factor:g}"
@@ -53,7 +57,7 @@ def peak_moment(record: Record) -> Figure:
         when += f", crank angle {np.degrees(past(record.crank_angle()[sample])):.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
     title = record.title(f"{subject} at the {reason}") + (_between_samples(record) if with_bearing else "")
-    frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.3, below=0.1)
+    frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.8 if on_paper else 0.3, below=0.1)
     return figure
 
 

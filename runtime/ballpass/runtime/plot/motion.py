@@ -120,23 +120,14 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         words = f"not to one scale: the path is\n{wide:.3g} µm wide and {high:.3g} µm high"
-        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}  # paths pass behind the words
-        axes.text(
-            0.98,
-            0.98,
-            words,
-            transform=axes.transAxes,
-            ha="right",
-            va="top",
-            fontsize=8,
-            color=GREY,
-            bbox=paper,
-            zorder=6,
-        )
+        axes.text(0.98, 0.98, words, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=GREY)
     if relative:
         around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 1e6 * record.radial_gap
         if radius > 0.0:
             axes.plot(radius * np.cos(around), radius * np.sin(around), color=GREY, linestyle=(0, (1, 1.5)), zorder=1)
+    if not equal:  # room for the words above the path
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
     against = " against the outer one" if relative else "'s centre"
     axes.set_xlabel(f"x of the inner ring{against} [µm]")
     axes.set_ylabel(f"y of the inner ring{against} [µm]")

@@ -7,6 +7,8 @@ Nothing here touches pyplot or leaves matplotlib's settings changed.
 from __future__ import annotations
 
 import io
+import math
+import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,16 +21,24 @@ import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_pdf import Op, PdfPages
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.units import printed_unit
+from ballpass.runtime.plot import PAPER
 
 #: 1200 pixels wide.
 DPI = 150
 WIDTH = 8.0
+
+#: Of figures for a paper: scale that makes letters of 9.5 points those of 7, and pixels in an inch.
+PAPER_SCALE = 7.0 / 9.5
+PAPER_DPI = 300
 
 # relative luminance (CIE L*): 22, 51, 78, 90
 INK = "#1d3557"
@@ -105,11 +115,18 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure of the common width and a height [inch], without pyplot.
 
+    One for a paper is as wide as its letters ask for, and lower; `save` scales it to the width of the paper.
+
     Parameters
     ----------
     layout : "constrained" finds room for all texts, which takes as long as drawing; None leaves it to `frame`
     """
-    return Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
+    width = PAPER.get()[0]
+    if width is not None:
+        width /= PAPER_SCALE
+        height *= min(1.0, math.sqrt(width / WIDTH))
+        layout = "constrained"
+    return Figure(figsize=(width or WIDTH, height), dpi=DPI, layout=layout)
 
 
 def frame(
@@ -131,6 +148,9 @@ def frame(
     above : further room between title and axes
     gaps : ``wspace`` and ``hspace`` between axes, in parts of their size
     """
+    if PAPER.get()[0] is not None and figure.get_layout_engine() is not None:
+        caption(figure, title, text)
+        return
     width, height = figure.get_size_inches()
     figure.suptitle(title, x=0.1 / width, y=1.0 - 0.1 / height, va="top", **TITLE)
     figure.set_label(text)
@@ -207,11 +227,79 @@ def write(axes: Axes, at: NDArray[np.float64], words: str, **look: Any) -> None:
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a file whose kind is that of its ending, PNG, SVG or PDF, and whose bytes depend on the drawing alone."""
-    kind, drawn = path.suffix.removeprefix("."), io.BytesIO()
+    kind, drawn, (width, titles) = path.suffix.removeprefix("."), io.BytesIO(), PAPER.get()
+    scale = 1.0 if width is None else PAPER_SCALE
     with settings():
-        figure.savefig(drawn, format=kind, dpi=DPI, metadata=_METADATA[kind])
+        given: dict[str, Any] = {"format": kind, "metadata": _METADATA[kind]}
+        if width is not None:
+            _fit(figure)
+        if not titles:
+            figure.suptitle("")
+            given["bbox_inches"] = _without_blank(figure)
+        if scale == 1.0:
+            figure.savefig(drawn, dpi=DPI, **given)
+        elif kind == "png":
+            dpi = (PAPER_DPI, PAPER_DPI)
+            figure.savefig(drawn, dpi=PAPER_DPI * scale, pil_kwargs={"dpi": dpi}, **given)
+        elif kind == "svg":
+            figure.savefig(drawn, **given)
+            size = re.compile(rb'(width|height)="([\d.]+)pt"')
+            content = size.sub(lambda found: b'%s="%.6gpt"' % (found[1], scale * float(found[2])), drawn.getvalue(), 2)
+            drawn = io.BytesIO(content)
+        else:
+            _save_pdf(figure, drawn, scale, given)
     replace_file(path, drawn.getvalue())
     return path
+
+
+def _fit(figure: Figure) -> None:
+    """Wrap titles and labels that are longer than their axes, and legends in as many columns as there is room for."""
+    for legend in list(figure.legends):
+        handles = [handle for handle in legend.legend_handles if handle is not None]
+        words = [text.get_text() for text in legend.get_texts()]
+        legend.remove()
+        for columns in range(len(words), 0, -1):
+            legend = figure.legend(handles, words, loc="outside lower left", ncols=columns, columnspacing=1.2)
+            figure.draw_without_rendering()
+            if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+                break
+            legend.remove()
+    figure.draw_without_rendering()
+    longest = [(text, figure.bbox.width * 0.97) for text in figure.texts]
+    for axes in figure.axes:
+        width, height = axes.bbox.size
+        while sum(text.get_window_extent().width + 4 for text in axes.get_xticklabels() if text.get_text()) > width:
+            axes.set_xticks(axes.get_xticks()[::2])
+        titles = [axes.get_title(loc=where) for where in ("left", "center", "right")]
+        own = [child for child in axes.get_children() if isinstance(child, Text) and child.get_text()]
+        notes = [text for text in own if text.get_text() in titles or text.get_text().count(" ") > 3]
+        longest += [(axes.xaxis.label, width), (axes.yaxis.label, height), *((text, width) for text in notes)]
+    for text, room in longest:
+        parts = math.ceil(max(text.get_window_extent().size) / room * len(text.get_text().splitlines()))
+        if parts > 1 and max(text.get_window_extent().size) > room:
+            most = math.ceil(len(text.get_text()) / parts) + 2  # for words are not equally long
+            text.set_text("\n".join(textwrap.wrap(text.get_text(), most, break_long_words=False)))
+
+
+def _without_blank(figure: Figure) -> Bbox:
+    """The figure in its whole width, without the blank above and below [inch]."""
+    figure.draw_without_rendering()
+    box = figure.get_tightbbox()
+    return Bbox([[0.0, box.y0 - 0.05], [figure.get_figwidth(), box.y1 + 0.05]])
+
+
+def _save_pdf(figure: Figure, drawn: io.BytesIO, scale: float, given: dict[str, Any]) -> None:
+    """Save a PDF whose page is scaled, which matplotlib has no option for: a figure has 72 points in an inch."""
+    with PdfPages(drawn, metadata=given.pop("metadata")) as pages:
+        file = pages._ensure_file()
+        begin = file.newPage
+
+        def scaled(width: float, height: float) -> None:
+            begin(width * scale, height * scale)
+            file.output(scale, 0.0, 0.0, scale, 0.0, 0.0, Op.concat_matrix)
+
+        file.newPage = scaled
+        figure.savefig(pages, **given)
 
 
 def write_figures(
@@ -232,8 +320,8 @@ def write_figures(
     written, lines = [], []
     for name, figure in figures:
         folder.mkdir(parents=True, exist_ok=True)
-        written += [save(figure, folder / f"{name}.{kind}") for kind in formats]
         title = " ".join(figure.get_suptitle().split())
+        written += [save(figure, folder / f"{name}.{kind}") for kind in formats]
         lines += [f"![{title}]({name}.{formats[0]})", "", f"**{title}.** {caption_of(figure)}".rstrip(), ""]
     if written:
         page = folder / captions

@@ -36,6 +36,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults, refuse_unknown
 from ballpass.runtime.contract.version import __version__
+from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.digits import uncertainties
 from ballpass.runtime.report.plain import json_text, to_plain
@@ -96,6 +97,8 @@ def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
     if question.figures is not None:
         parameters.append(_parameter("out", options.ResultsFolder if question.always else options.ReportFolder, None))
         parameters.append(_parameter("format_", options.FigureFormats, None))
+        parameters.append(_parameter("width_", options.FigureWidth, None))
+        parameters.append(_parameter("titles_", options.FigureTitles, True))
     if question.always:
         parameters.append(_parameter("figures", options.Figures, True))
 
@@ -200,9 +203,11 @@ def _ask(
     out: Path | None = None,
     figures: bool = True,
     format_: list[str] | None = None,
+    width_: float | None = None,
+    titles_: bool = True,
 ) -> None:
     """Run the question, write and print."""
-    with command(scene) as stages:
+    with command(scene) as stages, on_paper(width_, titles=titles_):
         question.refuse(values)
         folder, formats = _place(question, scene, out, format_, figures=figures)
         stages("reading the scene")

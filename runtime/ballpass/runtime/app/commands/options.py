@@ -6,8 +6,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.plot import FORMATS
+
+
+def paper_width(text: str) -> float:
+    """A width [m] from a text: 90mm, 9 cm, 3.5in; RequestError for another."""
+    number, unit = text.strip()[:-2], text.strip()[-2:]
+    try:
+        width = float(number) * {"mm": 1e-3, "cm": 1e-2, "in": 25.4e-3}[unit]
+    except (KeyError, ValueError):
+        width = 0.0
+    if not 0.05 <= width <= 0.5:
+        raise RequestError(f"{text!r} is not a width of a figure. Allowed: 50mm to 500mm, as 90mm, 9cm or 3.5in.")
+    return width
+
 
 SceneFile = Annotated[
     Path, Option(shown="SCENE", words="Scene file (TOML); `ballpass new` copies one.", positional=True)
@@ -68,6 +82,20 @@ FigureFormats = Annotated[
         flags=("--format",),
         choices=FORMATS,
     ),
+]
+
+FigureWidth = Annotated[
+    float | None,
+    Option(
+        shown="WIDTH",
+        words="Width of the figures in a paper, `90mm`: letters have 7 points in it. They are 8 inches wide without.",
+        flags=("--width",),
+        reader=paper_width,
+    ),
+]
+
+FigureTitles = Annotated[
+    bool, Option(words="Draw the titles of the figures. Captions have them too.", flags=("--title/--no-title",))
 ]
 
 Scheduler = Annotated[

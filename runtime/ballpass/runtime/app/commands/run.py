@@ -36,6 +36,7 @@ from ballpass.runtime.contract.options import (
     refuse_unknown,
 )
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
+from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.report.digits import uncertainties
 
@@ -136,13 +137,15 @@ def run(
     json_: options.Json = False,
     figures: options.Figures = True,
     format_: options.FigureFormats = None,
+    width_: options.FigureWidth = None,
+    titles_: options.FigureTitles = True,
 ) -> None:
     """Simulate a scene; write solution, summary and figures.
 
     Derives and compiles what is stale in generated/<scene>. Options not given are those of the scene's run table.
     A generated folder may stand in place of the scene. It is a program: load only folders you trust.
     """
-    with command(scene) as stages:
+    with command(scene) as stages, on_paper(width_, titles=titles_):
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.results import SOLUTION, SUMMARY
         from ballpass.runtime.app.summary_table import render_accuracy, render_summary

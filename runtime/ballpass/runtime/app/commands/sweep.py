@@ -37,6 +37,7 @@ from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
+from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
@@ -119,6 +120,8 @@ def sweep(
     json_: options.Json = False,
     figures: options.Figures = True,
     format_: options.FigureFormats = None,
+    width_: options.FigureWidth = None,
+    titles_: options.FigureTitles = True,
 ) -> None:
     """Run a scene for all values of one or more of its numbers; write table, grid and figures.
 
@@ -133,7 +136,7 @@ def sweep(
     from ballpass.runtime.many.cluster import connected
     from ballpass.runtime.quantity.grammar import default_quantities
 
-    with command(scene) as stages:
+    with command(scene) as stages, on_paper(width_, titles=titles_):
         stages("reading the scene")
         source: Scene | Manifest
         # how many turns a duration is, members with other speeds decide
