@@ -36,7 +36,8 @@ lint: $(VENV)/.ready-dev
 	$(BIN)/ballpass derive --check scenes/punching_press.toml
 
 docs: $(VENV)/.ready-docs
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@echo "Building the pages. The gallery computes its figures, which takes minutes; each page and figure is named."
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
 generated: $(VENV)/.ready

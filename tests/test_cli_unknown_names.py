@@ -218,3 +218,9 @@ def test_a_generated_folder_is_not_compiled_for_an_unknown_name(model: Model, mo
     done = CliRunner().invoke(app, ["run", str(model.folder), "--of", "max:inner.q"])
     assert done.exit_code == 2, (done.output, done.exception)
     assert "There is no output 'inner.q'" in done.output
+
+
+def test_a_command_that_is_called_otherwise_elsewhere_is_named() -> None:
+    done = CliRunner().invoke(app, ["simulate", "press.toml"])
+    assert done.exit_code == 2
+    assert "`ballpass run SCENE`" in done.stderr

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
-from ballpass.derive.emit.signature import source_key
+from ballpass.derive.emit.signature import folder_of, source_key
 from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.bearing_records import EquivalentMass, GivenContact, HertzContact
 from ballpass.derive.scene.errors import SceneError
@@ -322,3 +322,22 @@ def test_a_csv_file_without_the_column_is_refused(
     with pytest.raises(SceneError, match=words) as caught:
         read_scene(place)
     assert all(fault.line for fault in caught.value.faults)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("my-press", "my_press"),
+        ("my press", "my_press"),
+        ("2nd", "scene_2nd"),
+        ("Prüfung", "Pruefung"),
+        ("café", "cafe"),
+        ("机", "scene_"),
+    ],
+)
+def test_a_file_of_any_name_is_a_scene(tmp_path: Path, file: str, name: str) -> None:
+    """The name in code is mapped; folders have the name of the file, so that two files never share one."""
+    path = tmp_path / f"{file}.toml"
+    path.write_text(PRESS, encoding="utf-8")
+    assert read_scene(path).name == name
+    assert folder_of(path).name == file

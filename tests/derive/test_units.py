@@ -232,3 +232,10 @@ def test_a_number_of_a_table_is_read_in_a_scene(unit: str) -> None:
 def test_rational_powers_multiply() -> None:
     exact = Fraction(1, 1000) ** 3
     assert parse_quantity("1 (mm^1.5)^2", "m^3") == pytest.approx(float(exact), rel=1e-15, abs=0.0)
+
+
+def test_the_minus_of_printed_tables_is_understood_and_rpm_in_capitals_hinted_at() -> None:
+    assert parse_quantity("\u22125 mm", "m") == parse_quantity("-5 mm", "m")
+    with pytest.raises(QuantityError) as caught:
+        parse_quantity("500 RPM", "rad/s")
+    assert caught.value.remedy == 'write "rpm"'

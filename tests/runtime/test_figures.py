@@ -27,7 +27,7 @@ from ballpass.runtime.plot import CAPTIONS, NAMES, bearing, on_paper
 from ballpass.runtime.plot.animation import choose_frames, to_plain
 from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
-from ballpass.runtime.plot.mechanism import draw_mechanism
+from ballpass.runtime.plot.mechanism import _hatched_wall, draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
 from ballpass.runtime.plot.shapes import links, used_points
@@ -688,3 +688,16 @@ def test_figures_leave_pyplot_alone() -> None:
 def test_unknown_figure_is_refused_with_the_names_there_are(press: Run) -> None:
     with pytest.raises(RequestError, match="load_curve, orbit, spectra"):
         draw("waterfall", *press)
+
+
+@pytest.mark.parametrize("angle", [0.0, 45.0, 90.0, 135.0])
+def test_strokes_of_a_wall_stand_at_45_degrees_to_it(angle: float) -> None:
+    """Matplotlib's hatches have one direction on the paper: along a wall of 45° there was none to be seen."""
+    axes, way = Figure().add_subplot(), np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    _hatched_wall(axes, np.zeros(2), way, np.array([-way[1], way[0]]), 1.0)
+    *strokes, wall = [line.get_xydata() for line in axes.lines]
+    assert len(strokes) > 10
+    assert np.allclose(wall[1] - wall[0], way)
+    for stroke in strokes:
+        turned = (stroke[1] - stroke[0]) / np.linalg.norm(stroke[1] - stroke[0])
+        assert turned @ way == pytest.approx(math.sqrt(0.5))

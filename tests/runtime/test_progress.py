@@ -184,3 +184,17 @@ def test_a_bar_changes_no_bit(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     runs = [rotor.simulate(cycles=25, progress=shown_or_not) for shown_or_not in (False, True)]
     np.testing.assert_array_equal(runs[0].x, runs[1].x)
+
+
+def test_a_stage_without_fractions_says_that_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A first compilation of a page's solver was silent for a minute."""
+    monkeypatch.setattr(shared, "QUIET", 0.05)
+    with shared.Stages() as stages:
+        stages("compiling")
+        time.sleep(0.4)
+    said = capsys.readouterr().err
+    assert said.count("still compiling") >= 2
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ""  # nothing comes after the end

@@ -148,5 +148,5 @@ def test_a_linkage_that_outweighs_its_ring_and_a_sudden_load_are_said(make_model
         assert ("begins and ends at once" in said) == name.startswith("punching_press")
         if name == "punching_press":
             assert "the linkage, 19.7 kg" in said
-            assert "ring, 0.414 kg" in said
+            assert "ring, 0.414 kg, at 500 rpm" in said
             assert summarize(model, model.simulate(cycles=3))["limits"] == list(model.explain().limits)

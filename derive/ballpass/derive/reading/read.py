@@ -13,6 +13,7 @@ import math
 import re
 import shlex
 import tomllib
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -115,8 +116,22 @@ def read_scene(
         line = data[: error.start].count(b"\n") + 1
         raise _unreadable(file, "the file is not text in UTF-8", "save the file as UTF-8", line) from None
     return _scene(
-        text, name or file.stem, str(file), coupling, {str(key): item for key, item in (changes or {}).items()}
+        text, name or name_of_file(file), str(file), coupling, {str(key): item for key, item in (changes or {}).items()}
     )
+
+
+def name_of_file(file: Path) -> str:
+    """Name of a scene in code and messages: the file's without ending, other characters than ASCII letters as "_".
+
+    Examples
+    --------
+    >>> name_of_file(Path("scenes/3rd test-prüfung.toml"))
+    'scene_3rd_test_pruefung'
+    """
+    written = re.sub("[äöüÄÖÜ]", lambda letter: f"{letter[0]}e", file.stem).replace("ß", "ss")
+    plain = unicodedata.normalize("NFKD", written).encode("ascii", "ignore").decode()
+    name = re.sub(r"\W+", "_", plain)
+    return name if name[:1].isalpha() else f"scene_{name}"
 
 
 def scene_from_text(text: str, name: str) -> Scene:

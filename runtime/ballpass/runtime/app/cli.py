@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.bearings import bearings
@@ -23,6 +24,7 @@ from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.run import run
 from ballpass.runtime.app.commands.schema import schema
 from ballpass.runtime.app.commands.select import select
+from ballpass.runtime.app.commands.shared import complain
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import trade
@@ -32,7 +34,23 @@ from ballpass.runtime.questions import QUESTIONS
 #: Groups of commands in ``ballpass --help``, in this order.
 DESCRIBE, SIMULATE, ASK = "From scene to equations", "Simulate and export", "Ask of a scene"
 
+#: Names that are looked for, and the commands that do it.
+MEANT = {"simulate": "run", "solve": "run", "fmu": "export --fmu"}
+
+
+class Commands(TyperGroup):
+    """The commands; one that is called otherwise elsewhere is named."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """As typer does it."""
+        if args and args[0] in MEANT:
+            complain(f"There is no command '{args[0]}'. `ballpass {MEANT[args[0]]} SCENE` does it.")
+            raise typer.Exit(2)
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
+    cls=Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["--help", "-h"]},

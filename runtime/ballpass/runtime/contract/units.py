@@ -152,7 +152,7 @@ def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> f
             raise refuse("the unit is missing", f'write the number as text with its unit, "{show(given)} <unit>"')
         return value
 
-    text = given.strip()
+    text = given.strip().replace("\u2212", "-")  # the minus sign of printed tables
     if len(text) > MAX_LENGTH:
         raise refuse(f"a text of {len(text)} characters is no quantity", f"use at most {MAX_LENGTH} characters")
     match = _NUMBER.match(text)
@@ -407,6 +407,8 @@ def unknown_unit(name: str) -> UnitSize:
 
 def unit_hint(name: str) -> str:
     """Remedy for a name that is not a unit."""
+    if name.lower() in COMMON:
+        return f'write "{name.lower()}"'
     if re.fullmatch(r"[kMm]?N[mn]*m?", name):
         return 'write products with "*", as in "N*m"'
     if re.search(r"\d", name):

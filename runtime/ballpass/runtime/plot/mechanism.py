@@ -250,9 +250,12 @@ def _draw_ground(axes: Axes, at: Array, size: float) -> None:
 
 
 def _hatched_wall(axes: Axes, start: Array, end: Array, outward: Array, size: float) -> None:
-    depth = 0.022 * size * outward
-    corners = [start, end, end + depth, start + depth]
-    axes.add_patch(Polygon(corners, facecolor="white", edgecolor=GREY, hatch="/////", linewidth=0.0, zorder=0.8))
+    depth = 0.022 * size
+    along = (end - start) / max(float(np.hypot(*(end - start))), 1e-12)
+    feet = start + np.arange(0.0, float((end - start) @ along), 0.7 * depth)[:, None] * along
+    # strokes of our own: those of matplotlib have one direction on the paper, and are lost along a wall of 45°
+    for foot in feet:
+        axes.plot(*np.array([foot, foot + depth * (outward + along)]).T, color=GREY, linewidth=0.7, zorder=0.8)
     axes.plot(*np.array([start, end]).T, color=INK, linewidth=1.5, zorder=2)
 
 

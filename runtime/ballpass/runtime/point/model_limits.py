@@ -51,8 +51,9 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
         if bearing.joint and ring is not None and linkage > ring:
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
-                f"ring, {ring:.3g} kg. Where the linkage outweighs the ring, peak forces may be far too low, and more "
-                "so the faster it turns. `ballpass trade SCENE --against two-way` measures it."
+                f"ring, {ring:.3g} kg{_turning(manifest, values)}. Where the linkage outweighs the ring, peak forces "
+                "may be far too low, and more so the faster it turns. `ballpass trade SCENE --against two-way` measures "
+                "it."
             )
     gates = {info.name for info in manifest.inputs if info.kind == "gate"}
     sudden = [name for name, _, _, item in mechanism.forces if item in gates]
@@ -64,6 +65,12 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
             f"{', '.join(sudden)}: the load begins and ends at once. Peaks behind its edges are the overshoot of a "
             'sudden load; a real one rises: give its window a rise, as rise = "5 deg".'
         )
+
+
+def _turning(manifest: Manifest, values: Mapping[str, float]) -> str:
+    """Speed of the driver in words, where the scene has one speed."""
+    speed = values.get(manifest.mechanism.speed) if manifest.mechanism is not None else None
+    return "" if speed is None else f", at {abs(speed) * 30.0 / math.pi:.4g} rpm"
 
 
 def limits_of_fit(bearing: BearingInfo, values: Mapping[str, float]) -> Iterator[str]:

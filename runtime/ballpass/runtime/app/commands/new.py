@@ -14,6 +14,9 @@ from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.contract.parameters import unknown_name
 
+#: The scene to begin with.
+PRESS = "punching_press.toml"
+
 
 def _names(incomplete: str) -> list[str]:
     """Names that the shell completes; none where only the runtime is installed."""
@@ -37,6 +40,9 @@ def new(
     folder: Annotated[
         Path, Option(shown="DIR", words="Folder to copy it to; made if it does not exist.", positional=True)
     ] = Path(),
+    all_: Annotated[
+        bool, Option(words="Copy all scenes and data sets into the folder named; what is there already stays.")
+    ] = False,
     list_: Annotated[bool, Option(words="Print names and titles of all scenes; so without NAME.")] = False,
 ) -> None:
     """Copy a scene or a data set that comes with ballpass into a folder. An existing file is not overwritten."""
@@ -45,6 +51,19 @@ def new(
 
         scenes, data_sets = shipped_scenes(), shipped_data_sets()
         known = {**scenes, **data_sets}
+        if all_:
+            place = Path(name or ".")
+            if place.is_file():
+                raise RequestError(f"new --all: {place} is a file. Allowed: a folder, existing or not.")
+            place.mkdir(parents=True, exist_ok=True)
+            for each, path in known.items():
+                copy = place / path.name
+                if copy.exists():
+                    show(f"{copy}: was there already")
+                else:
+                    _write(copy, scene_of(path)[1] if each in data_sets else path.read_text(encoding="utf-8"))
+            show(f"{len(known)} scenes and data sets in {place}\nNext: ballpass run {shlex.quote(str(place / PRESS))}")
+            return
         if list_ or name is None:
             width = max(map(len, known))
             for each, path in known.items():

@@ -13,6 +13,7 @@ import os
 import sys
 import tempfile
 import textwrap
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -167,7 +168,7 @@ def size_words(count: int) -> str:
 
 
 class Stages:
-    """Progress on stderr: on a terminal bars that move, elsewhere a line when a stage begins, a few of a long one."""
+    """Progress on stderr: on a terminal bars that move, elsewhere a line when a stage begins and while it lasts."""
 
     def __init__(self) -> None:
         # with FORCE_COLOR rich takes a file for a terminal as well
@@ -183,12 +184,22 @@ class Stages:
         self._begin = self._written = time.perf_counter()
         self._words = ""
         self._task: Any = None
+        self._ended = threading.Event()
 
     def __enter__(self) -> Stages:
         self._progress.__enter__()
+        if not self._moving:
+            threading.Thread(target=self._remind, daemon=True).start()
         return self
 
+    def _remind(self) -> None:
+        """A line where nothing was written for long: what takes long without fractions, as a compiler, is at work."""
+        while not self._ended.wait(max(self._written + QUIET - time.perf_counter(), 0.01)):
+            if self._words and time.perf_counter() - self._written >= QUIET:
+                self._write(f"still {self._words}")
+
     def __exit__(self, *error: Any) -> None:
+        self._ended.set()
         if error[0] is None:
             self._finish()
         elif self._task is not None:
