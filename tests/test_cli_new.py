@@ -112,6 +112,20 @@ def test_new_copies_a_data_set_with_its_scene_and_keeps_a_scene_that_is_there(tm
     assert (tmp_path / "rotor.toml").read_text(encoding="utf-8") == "mine"
 
 
+def test_all_scenes_are_copied_at_once_and_what_is_there_stays(tmp_path: Path) -> None:
+    scenes = tmp_path / "scenes"
+    scenes.mkdir()
+    (scenes / "four_bar.toml").write_text("mine", encoding="utf-8")
+    done = call("new", "--all", scenes)
+    assert done.exit_code == 0
+    assert "four_bar.toml: was there already" in done.stdout
+    assert (scenes / "four_bar.toml").read_text(encoding="utf-8") == "mine"
+    shipped = {path.name: path for path in (ROOT / "scenes").rglob("*.toml")}
+    assert {path.name for path in scenes.iterdir()} == set(shipped)
+    assert (scenes / "v_compressor.toml").read_bytes() == shipped["v_compressor.toml"].read_bytes()
+    assert read_spec(scenes / "bearing_faults.toml").classes
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A generated folder whose scene is elsewhere."""

@@ -157,7 +157,9 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.long
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
 def test_blocks_of_a_page_run(page: str, generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    # pages that copy all scenes run as they are printed, anywhere
+    if "$ ballpass new --all scenes" not in (ROOT / page).read_text(encoding="utf-8"):
+        shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
     shutil.copytree(generated, tmp_path / "generated")
     shutil.copy(ROOT / "scenes" / "punching_press.toml", tmp_path / "my_press.toml")
     monkeypatch.chdir(tmp_path)
@@ -177,6 +179,16 @@ def test_blocks_of_a_page_run(page: str, generated: Path, tmp_path: Path, monkey
             fault.add_note(f"{page}, block at line {line}")
             raise
     plt.close("all")
+
+
+def test_the_index_of_how_to_s_has_a_sentence_for_each() -> None:
+    """In its groups and in the contents at the side; pages of numbers are parts of others."""
+    text = (ROOT / "docs/howto/index.md").read_text(encoding="utf-8")
+    shown, listed = text.split("```{toctree}")
+    pages = {path.stem for path in (ROOT / "docs/howto").glob("*.md")} - {"index"}
+    pages = {name for name in pages if not name.endswith("_numbers")}
+    assert re.findall(r"^- {doc}`(\w+)`: \w.*\.$", shown, re.MULTILINE) == listed.split()[1:-1]
+    assert set(listed.split()[1:-1]) == pages
 
 
 def test_pages_name_the_commands_and_options_that_there_are() -> None:

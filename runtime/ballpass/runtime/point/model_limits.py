@@ -52,8 +52,8 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
                 f"ring, {ring:.3g} kg{_turning(manifest, values)}. Where the linkage outweighs the ring, peak forces "
-                "may be far too low, and more so the faster it turns. `ballpass trade SCENE --against two-way` measures "
-                "it."
+                "may be far too low, and more so the faster it turns. "
+                "`ballpass trade SCENE --against two-way` measures it."
             )
     gates = {info.name for info in manifest.inputs if info.kind == "gate"}
     sudden = [name for name, _, _, item in mechanism.forces if item in gates]
