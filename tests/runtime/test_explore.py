@@ -314,6 +314,38 @@ def test_work_and_spectrum_of_a_run_that_ends_within_a_turn_are_those_of_whole_t
     assert lines[:, 1] == pytest.approx(native, abs=1e-3 * float(native.max()))
 
 
+#: Sizes of all texts [px], those of pictures as they are scaled.
+SIZES = """(() => {
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), sizes = [];
+  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+    const parent = node.parentElement, range = document.createRange();
+    range.selectNodeContents(node);
+    if (!node.textContent.trim() || range.getBoundingClientRect().width < 1) continue;
+    const scale = parent.closest("svg") ? Math.hypot(parent.getScreenCTM().a, parent.getScreenCTM().b) : 1;
+    sizes.push(scale * parseFloat(getComputedStyle(parent).fontSize));
+  }
+  return sizes;
+})()"""
+
+
+@needs_browser
+@needs_compiler
+@pytest.mark.long
+@pytest.mark.parametrize("width", [390, 1280])
+def test_all_words_of_a_page_can_be_read_and_no_panel_is_half_blank(page: Path, browser: Page, width: int) -> None:
+    """On a telephone ball numbers had 5 px; on a screen the panel beside the orbit was blank for 300 px."""
+    browser.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 500)
+    browser.open(page)
+    browser.wait(DONE)
+    assert min(browser.value(SIZES)) >= 9.0
+    assert browser.value("document.documentElement.scrollWidth") <= width
+    panels = "[...document.querySelectorAll('#charts section')]"
+    below = "one.getBoundingClientRect().bottom - one.lastElementChild.getBoundingClientRect().bottom"
+    blank = browser.value(f"{panels}.map((one) => {below})")
+    assert len(blank) > 3
+    assert max(blank) < 140.0
+
+
 def _signals(numbers: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     if isinstance(numbers, dict):
         if "decimals" in numbers:

@@ -31,7 +31,7 @@ from functools import lru_cache
 from ballpass.runtime.contract.errors import RequestError
 
 #: Unit of a number in a file -> factor and unit in tables and figures, where six digits of a displacement are six then.
-_TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+_TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s"), "turns": (1e-6, "million turns")}
 
 #: Longest text read as a quantity; the longest sensible one has some thirty characters.
 MAX_LENGTH = 100

@@ -185,7 +185,7 @@ function drawOrbit(bearing, number) {
   if (old) draw(picture, "polyline", { points: old, fill: "none", stroke: "var(--soft)", "stroke-width": 0.5, "stroke-dasharray": "1 1" });
   draw(picture, "polyline", { points: now, fill: "none", stroke: "var(--ink)", "stroke-width": 0.8, "stroke-linejoin": "round" });
   const dot = draw(picture, "circle", { r: 1.8, fill: "var(--signal)" });
-  for (const value of ticks(0, 56 / unit).slice(1)) draw(picture, "text", { x: value * unit, y: 4.5, "font-size": 4, "text-anchor": "middle" }, value);
+  for (const value of ticks(0, 56 / unit).slice(1)) draw(picture, "text", { x: value * unit, y: 5.4, "font-size": 4.8, "text-anchor": "middle" }, value);
   element(section, "p", `${limit > 0 ? "dashed circle: gap between the rings; " : ""}equal scales${compared ? "; dotted: the scene's numbers" : ""}`);
   return (k) => set(dot, { cx: at(bearing.inner[0], k) * unit, cy: -at(bearing.inner[1], k) * unit });
 }
