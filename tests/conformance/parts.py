@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from coupled_scenes import RUN, bearing, linkage_text
+from linkages import MACHINES
 from quick_cases import long_but
 
 from ballpass.derive.bearing.effects import EFFECTS
@@ -350,14 +352,20 @@ def _forces() -> list[Part]:
     return found
 
 
-# dyads, each in a shipped machine
+# dyads, each in a shipped machine, or in one of tests/machines with bearings that move it
 
 
 def _dyads() -> list[Part]:
-    scenes = {"RRR": "four_bar", "RRP": "offset_slider", "RPR": "crank_shaper"}
+    texts = {
+        kind: shipped(name) for kind, name in (("RRR", "four_bar"), ("RRP", "offset_slider"), ("RPR", "crank_shaper"))
+    }
+    turned: dict[str, Any] = {"bodies": ("frame", "crank")}
+    texts |= {
+        kind: linkage_text(MACHINES[name]().with_joint("A", **turned)) + bearing("F", "block", elastic=True) + RUN
+        for kind, name in (("RPP", "yoke on a moving body"), ("PRP", "rapson's slide"))
+    }
     return [
-        Part(registry="dyad", name=kind, text=shipped(scene), docs=("reference/scene.md", kind))
-        for kind, scene in scenes.items()
+        Part(registry="dyad", name=kind, text=text, docs=("reference/scene.md", kind)) for kind, text in texts.items()
     ]
 
 
@@ -467,7 +475,7 @@ QUICK = (
         "force forces PistonPressure AngleTable",
         "force springs TwoPoints SpringDamper",
     ),
-    *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR"),
+    *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR", "dyad RPP"),
     "shaft tilting",
 )
 PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads(), *_shafts())

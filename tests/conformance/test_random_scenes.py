@@ -80,7 +80,7 @@ def test_runs_of_random_scenes_agree(seed: int, model_of: Callable[..., Model], 
     model = model_of(text(scene(seed)))
     run: dict[str, Any] = {"cycles": 0.1, "transient": 0}
     single = model.simulate(**run, method="stepper", rtol=1e-9)
-    other = model.simulate(**run, method="cvodes", rtol=1e-9)
+    other = model.simulate(**run, method="cvodes", rtol=1e-10)  # whose error is ten times its tolerance
     for name in (*single.states, *single.outputs):
         apart = np.abs(single[name] - other[name])
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi)) if "angle" in name or "cage.in" in name else apart

@@ -15,6 +15,7 @@ from linkages import (
     DRIVE,
     MACHINES,
     Machine,
+    build,
     crank_slider,
     evaluate,
     four_bar,
@@ -300,6 +301,31 @@ def driven_at(joint: str) -> Mechanism:
     return replace(mechanism, driver=replace(mechanism.driver, joint=joint))
 
 
+def triad() -> Machine:
+    """A plate with three hinges, on a rod from the crank and on two rockers."""
+    bar = {"mass": 1.0, "inertia": 1e-3}
+    return build(
+        frame={"A": None, "D": ("xy", 0.2, 0.0), "E": ("xy", 0.1, 0.2)},
+        bodies={
+            "crank": {**bar, "points": {"A": None, "B": 0.05}},
+            "rod": {**bar, "points": {"B": None, "C": 0.1}},
+            "plate": {**bar, "points": {"C": None, "F": 0.1, "G": ("xy", 0.05, 0.08)}},
+            "left": {**bar, "points": {"F": None, "D": 0.1}},
+            "right": {**bar, "points": {"G": None, "E": 0.1}},
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "rod")},
+            "C": {"bodies": ("rod", "plate")},
+            "F": {"bodies": ("plate", "left")},
+            "G": {"bodies": ("plate", "right")},
+            "D": {"bodies": ("left", "frame")},
+            "E": {"bodies": ("right", "frame")},
+        },
+        speed=10.0,
+    )
+
+
 BAR, SLIDER = four_bar().mechanism, crank_slider().mechanism
 
 
@@ -324,12 +350,28 @@ BAR, SLIDER = four_bar().mechanism, crank_slider().mechanism
             watt_six_bar().with_joint("C", bodies=("coupler", "link"), points=("C", "F"), branch=None).mechanism,
             r"no dyad places the bodies coupler, rocker, link, arm: 12 unknowns .* and 12 equations",
         ),
+        (
+            triad().mechanism,
+            "rod, plate, left, right are placed together alone, an Assur group of class III",
+        ),
         (crank_slider().with_joint("C", points=("B", "C")).mechanism, "same point of rod"),
         (driven_at("D"), "prismatic joint cannot be the driver"),
         (driven_at("B"), "driver"),
         (driven_at("nowhere"), "driver"),
     ],
-    ids=["3", "-1", "truss", "chain", "beside the driver", "no dyad", "one point", "guide", "not at the frame", "none"],
+    ids=[
+        "3",
+        "-1",
+        "truss",
+        "chain",
+        "beside the driver",
+        "no dyad",
+        "triad",
+        "one point",
+        "guide",
+        "not at the frame",
+        "none",
+    ],
 )
 def test_what_is_no_linkage_of_one_driver_is_refused_with_the_count(mechanism: Mechanism, words: str) -> None:
     with pytest.raises(LinkageError, match=words):

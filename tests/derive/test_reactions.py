@@ -17,8 +17,11 @@ from linkages import (
     four_bar,
     moving_guide,
     offset_slider,
+    rapson_slide,
+    scotch_yoke,
     shaper_with_ram,
     slotted_lever,
+    yoke_on_rocker,
 )
 
 from ballpass.derive.mechanism.linkage import Linkage
@@ -185,6 +188,12 @@ CASES = {
     "crank of 50 um": (lambda: crank_slider(crank=50e-6, rod=0.1), ()),
     "slotted lever near its dead centre": (lambda: slotted_lever(crank=0.107), ()),
     "shaper with ram": (shaper_with_ram, ()),
+    "scotch yoke, guides 3 degrees apart": (
+        lambda: scotch_yoke().with_values(mechanism__joints__S__direction=10 * DEGREE),
+        ("G",),
+    ),
+    "yoke on a moving body": (yoke_on_rocker, ()),
+    "rapson's slide": (rapson_slide, ("G",)),
 }
 
 

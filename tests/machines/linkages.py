@@ -457,6 +457,97 @@ def shaper_with_ram() -> Machine:
     return Machine(mechanism=both, values={**machine.values, **further.values})
 
 
+def scotch_yoke(branch: str | None = None, slot_on_block: bool = False) -> Machine:
+    """Crank, block, yoke on an inclined guide; slot and guide beside their points, and not at right angles."""
+    yoke, block = ("yoke", "slot"), ("block", "shoe")
+    first, second = (block, yoke) if slot_on_block else (yoke, block)
+    return build(
+        frame={"A": ("xy", 0.01, 0.02), "guide": ("xy", -0.02, 0.05)},
+        bodies={
+            "crank": {"mass": 0.5, "inertia": 6e-4, "center": ("xy", 0.01, 0.006), "points": {"A": None, "B": 0.05}},
+            "block": {
+                "mass": 0.3,
+                "center": ("xy", 0.004, -0.003),
+                "points": {"B": ("xy", 0.003, 0.002), "shoe": ("xy", -0.006, 0.004)},
+            },
+            "yoke": {
+                "mass": 2.0,
+                "center": ("xy", 0.03, 0.011),
+                "points": {"slot": ("xy", 0.02, -0.03), "Y": ("xy", 0.09, 0.01), "tool": ("xy", 0.2, 0.02)},
+            },
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "block")},
+            "S": {
+                "bodies": (first[0], second[0]),
+                "points": (first[1], second[1]),
+                "direction": 80 * DEGREE,
+                "branch": branch,
+            },
+            "G": {"bodies": ("frame", "yoke"), "points": ("guide", "Y"), "direction": 7 * DEGREE},
+        },
+        forces={"push": ("yoke", "tool", ("xy", -310.0, 45.0))},
+        torques={"friction": ("crank", -0.7)},
+        speed=40.0,
+    )
+
+
+def yoke_on_rocker() -> Machine:
+    """Four-bar whose rocker carries the guide of a yoke; its block is hinged to the crank."""
+    return _extended(
+        {},
+        {
+            "block": {
+                "mass": 0.3,
+                "inertia": 2e-4,
+                "center": ("xy", 0.004, -0.003),
+                "points": {"B": ("xy", 0.003, 0.002), "S": ("xy", -0.006, 0.004)},
+            },
+            "yoke": {
+                "mass": 0.8,
+                "inertia": 2e-3,
+                "center": ("xy", 0.03, 0.011),
+                "points": {"S": ("xy", 0.02, -0.03), "E": ("xy", 0.09, 0.01)},
+            },
+        },
+        {
+            "S": {"bodies": ("block", "yoke"), "direction": 100 * DEGREE},
+            "E": {"bodies": ("yoke", "rocker"), "direction": 15 * DEGREE},
+            "F": {"bodies": ("block", "crank"), "points": ("B", "B")},
+        },
+        {"E": ("xy", 0.12, 0.05)},
+    )
+
+
+def rapson_slide(guide_on_ram: bool = False) -> Machine:
+    """Four-bar whose rocker carries a slot; its block is hinged to a ram on the frame, which carries a tool."""
+    ram, frame = ("ram", "foot"), ("frame", "guide")
+    first, second = (ram, frame) if guide_on_ram else (frame, ram)
+    return _extended(
+        {"guide": ("xy", 0.3, 0.2)},
+        {
+            "block": {
+                "mass": 0.4,
+                "inertia": 3e-4,
+                "center": ("xy", 0.005, 0.007),
+                "points": {"F": ("xy", 0.002, 0.001), "E": ("xy", 0.004, -0.006)},
+            },
+            "ram": {
+                "mass": 2.0,
+                "center": ("xy", 0.01, 0.02),
+                "points": {"F": ("xy", -0.02, 0.01), "foot": ("xy", 0.05, -0.03)},
+            },
+        },
+        {
+            "F": {"bodies": ("ram", "block")},
+            "E": {"bodies": ("rocker", "block"), "direction": 35 * DEGREE},
+            "G": {"bodies": (first[0], second[0]), "points": (first[1], second[1]), "direction": 10 * DEGREE},
+        },
+        {"E": ("xy", 0.03, 0.04)},
+    )
+
+
 MACHINES = {
     "crank-slider": crank_slider,
     "crank-slider behind": lambda: crank_slider(branch="behind"),
@@ -476,4 +567,9 @@ MACHINES = {
     "slotted lever, guide on the block": lambda: slotted_lever(guide_on_block=True),
     "slotted lever that goes round": lambda: slotted_lever(crank=0.18),
     "shaper with ram": shaper_with_ram,
+    "scotch yoke": scotch_yoke,
+    "scotch yoke, slot on the block": lambda: scotch_yoke("ahead", slot_on_block=True),
+    "yoke on a moving body": yoke_on_rocker,
+    "rapson's slide": rapson_slide,
+    "rapson's slide, guide on the ram": lambda: rapson_slide(guide_on_ram=True),
 }

@@ -452,22 +452,23 @@ class Reference:
 
     def _on_branches(self, q: Array) -> bool:
         placed, still = {"frame", self.driven}, np.zeros(self.size)
-        waiting = [name for name, joint in self.joints.items() if "branch" in joint]
-        while waiting:
-            for name in waiting:
-                pair = self.joints[name]["bodies"]
+        while True:
+            for name, joint in self.joints.items():  # noqa: B007 - used after the loop
+                pair = joint["bodies"]
                 outer = [
                     [n for n, j in self.joints.items() if b in j["bodies"] and placed & {*j["bodies"]}] for b in pair
                 ]
                 if all(outer) and not placed & {*pair}:
                     break
             else:
-                raise AssertionError("no dyad")
-            waiting.remove(name)
+                assert placed == {"frame", *self.bodies}, "no dyad"
+                return True
             placed |= {*pair}
+            kinds = [self.joints[names[0]]["type"] for names in outer]
+            if [*kinds, self.joints[name]["type"]].count("prismatic") == 2:  # it has one position
+                continue
             branch, inner = self.joints[name]["branch"], self.ends(name, q, still)[0][0]
             one, two = (self.ends(names[0], q, still)[0][0] for names in outer)
-            kinds = [self.joints[names[0]]["type"] for names in outer]
             if self.joints[name]["type"] == "prismatic":
                 side = self.guide(name, q) @ (two - one)
             elif "prismatic" in kinds:
@@ -477,7 +478,6 @@ class Reference:
                 side = (QUARTER @ (two - one)) @ (inner - one)
             if (side > 0) != (branch in ("left", "ahead")):
                 return False
-        return True
 
     def pose(self, angle: float, state: Mapping[str, float]) -> Array:
         """Of the displaced linkage, followed from the start so that angles keep their turns."""

@@ -30,7 +30,7 @@ from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import _hatched_wall, draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
-from ballpass.runtime.plot.shapes import links, used_points
+from ballpass.runtime.plot.shapes import guide_direction, links, used_points
 from ballpass.runtime.plot.style import (
     INK,
     PALE,
@@ -625,6 +625,16 @@ window = { start = "260 deg", end = "240 deg" }
         numbers = {"mechanism.forces.other.window.end": math.radians(end)}
         record = gather(model, model.simulate(cycles=0.01, transient=0, parameters=numbers))
         assert len(record.load_windows()) == count
+
+
+def test_a_block_that_passes_the_point_of_its_guide_keeps_its_direction() -> None:
+    """A Scotch yoke: its block is at the middle of the slot twice a turn, where two points give no direction."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    rail, block = ("yoke", "Y"), ("block", "B")
+    trace = {rail: np.column_stack([np.cos(angle), 0 * angle]), block: np.column_stack([np.cos(angle), np.sin(angle)])}
+    for now in (0.0, 1e-3, 0.3, np.pi):
+        pose = {rail: np.array([np.cos(now), 0.0]), block: np.array([np.cos(now), np.sin(now)])}
+        assert abs(guide_direction(pose, trace, rail, block) @ [0.0, 1.0]) == pytest.approx(1.0)
 
 
 def test_two_forces_at_one_point_have_words_apart(make_virtual: Callable[..., Model]) -> None:

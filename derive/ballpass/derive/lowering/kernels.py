@@ -340,7 +340,8 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
 
     def place(angle: ca.SX) -> int | None:
         """Number of an angle; None where it is no linear function of time."""
-        if not ca.depends_on(angle, t) or ca.depends_on(ca.jacobian(angle, t), t):
+        taken = ca.vertcat(*cosines, *sines)  # functions of time as well
+        if not ca.depends_on(angle, t) or ca.depends_on(ca.jacobian(angle, t), t) or ca.depends_on(angle, taken):
             return None
         for k, known in enumerate(angles):
             if ca.is_equal(known, angle, 4):

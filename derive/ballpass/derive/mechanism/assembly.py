@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from ballpass.derive.mechanism.dyads import DYADS, Dyad
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
+
+#: Most bodies of an Assur group that is named.
+LARGEST_GROUP = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,6 +133,12 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
     if len(loose) == len(left_over):
         held.append("none of them has a joint to a body already placed")
     reason = f" ({'; '.join(held)})" if held else ""
+    group, remedy = _group(mechanism, placed, left_over), "check the bodies named by each of these joints"
+    if group:
+        inner = [joint for joint in joints if joint.bodies[0] in group and joint.bodies[1] in group]
+        higher = "III" if len(inner) < len(group) else "IV or higher, with a closed loop of its bodies"
+        reason = f"; {_listed(group)} are placed together alone, an Assur group of class {higher}{reason}"
+        remedy += ", or drive the linkage at another joint: seen from there it may consist of dyads"
     return Fault(
         key="mechanism.joints",
         problem=(
@@ -140,8 +150,19 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
             "dyads of two bodies with a joint between them, each with exactly one joint to a body already placed: "
             + "; ".join(f"{kind.words} ({kind.kind})" for kind in DYADS)
         ),
-        remedy="check the bodies named by each of these joints",
+        remedy=remedy,
     )
+
+
+def _group(mechanism: Mechanism, placed: Sequence[str], left_over: Sequence[str]) -> tuple[str, ...]:
+    """The fewest bodies, four or more, whose joints with each other and with placed ones fix them; none of many."""
+    for size in range(4, min(len(left_over), LARGEST_GROUP) + 1, 2):
+        for group in combinations(left_over, size):
+            known = {*placed, *group}
+            touching = [j for j in mechanism.joints if {*j.bodies} & {*group}]
+            if 2 * len(touching) == 3 * size and all({*j.bodies} <= known for j in touching):
+                return group
+    return ()
 
 
 def _idle_faults(driven: str, dyads: Sequence[Dyad]) -> list[Fault]:
@@ -182,10 +203,9 @@ def _branch_faults(mechanism: Mechanism, dyads: Sequence[Dyad]) -> list[Fault]:
                     )
                 )
             continue
-        if joint.branch in dyad.branches:
+        alone, missing = len(dyad.branches) == 1, joint.branch is None
+        if joint.branch in dyad.branches or (alone and missing):
             continue
-        one, two = dyad.branches
-        missing = joint.branch is None
         faults.append(
             Fault(
                 key=key,
@@ -193,8 +213,8 @@ def _branch_faults(mechanism: Mechanism, dyads: Sequence[Dyad]) -> list[Fault]:
                     f"joint {joint.name} closes the {dyad.kind} dyad of {dyad.bodies[0]} and {dyad.bodies[1]} and "
                     + ("has no branch" if missing else "has a branch of another dyad")
                 ),
-                given="nothing" if joint.branch is None else joint.branch,
-                allowed=f"{one} or {two}",
+                given="nothing" if missing else str(joint.branch),
+                allowed=" or ".join((*dyad.branches, *(("no branch",) if alone else ()))),
                 remedy=f"say {dyad.branch_meaning()}",
             )
         )

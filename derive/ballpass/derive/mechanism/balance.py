@@ -27,7 +27,7 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.records import CENTER_OF_MASS, Joint, Mechanism
+from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, Joint, Mechanism
 from ballpass.derive.terms import components, symbol_of
 
 #: Torque of the drive on the driven body [N*m], counter-clockwise.
@@ -44,7 +44,6 @@ class Guide:
     host, slider : the body that counts as its rail, and the one that slides on it
     direction : unit vector of the guide in the frame's axes
     travel : distance [m] of the slider from where the joint's two points coincide, along `direction`
-    fixed : the host is the frame, so the slider does not turn
     """
 
     joint: Joint
@@ -52,7 +51,11 @@ class Guide:
     slider: str
     direction: Pair
     travel: sp.Expr
-    fixed: bool
+
+    @property
+    def fixed(self) -> bool:
+        """The host is the frame, so the slider does not turn."""
+        return self.host == FRAME
 
     @property
     def normal(self) -> Pair:

@@ -20,7 +20,6 @@ from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance
 from ballpass.derive.mechanism.kinematics import Ledger, Pair, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import Definition
 
 
@@ -66,8 +65,8 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
         a body without inertia whose moment balance is needed; `moments` names a joint that is not prismatic.
     """
     mechanism = linkage.mechanism
-    guides = {p.guide.joint.name: p.guide for p in linkage.placements if p.guide is not None}
-    _refuse(mechanism, guides, moments)
+    guides = {guide.joint.name: guide for p in linkage.placements for guide in p.guides}
+    _refuse(linkage, guides, moments)
     driver, driven = linkage.driver, linkage.driven
     balance = Balance(mechanism, linkage.poses, driver, guides, loads, moments)
     matrix, right_side, rows = balance.equations(driven)
@@ -92,19 +91,17 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     )
 
 
-def _refuse(mechanism: Mechanism, guides: Mapping[str, Guide], moments: frozenset[str]) -> None:
-    at_rest = {g.slider for g in guides.values() if g.fixed}
+def _refuse(linkage: Linkage, guides: Mapping[str, Guide], moments: frozenset[str]) -> None:
     faults = [
         Fault(
             key=f"mechanism.bodies.{body.name}.inertia",
             problem=f"the moment balance of {body.name} is needed, and the body has no moment of inertia",
             given="nothing",
-            allowed="a moment of inertia about the centre of mass; it may be left out for a slider on a fixed "
-            "guide, which does not turn",
+            allowed="a moment of inertia about the centre of mass; bodies that guides keep from turning need none",
             remedy=f'give mechanism.bodies.{body.name}.inertia, as in inertia = "611.7 kg*mm^2"',
         )
-        for body in mechanism.bodies
-        if body.inertia is None and body.name not in at_rest
+        for body in linkage.mechanism.bodies
+        if body.inertia is None and linkage.poses[body.name].rate != 0
     ]
     faults += [
         Fault(

@@ -46,8 +46,9 @@ BRANCH = ChoiceKey(
     words="On which of the two sides the dyad is assembled",
     choices=BRANCHES,
     optional=True,
-    when="required at the inner joint of each dyad, else refused",
-    note="left and right for RRR, ahead and behind for RRP and RPR; see {doc}`../theory/linkage`",
+    when="required at the inner joint of each dyad with two positions, else refused",
+    note="left and right for RRR, ahead and behind for RRP and RPR; RPP and PRP have one position, and no branch or "
+    "`ahead`; see {doc}`../theory/linkage`",
 )
 FLYWHEEL = number(
     "kg*m^2",

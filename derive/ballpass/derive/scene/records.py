@@ -73,9 +73,9 @@ class NamedPoint:
 class Body:
     """A moving rigid body.
 
-    `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate and whose moment balance
-    is not needed.  `positions` are places of its points along the shaft [m], of the driven body alone; with
-    `transverse_inertia` [kg*m^2] that tilts in its bearings.
+    `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate.  `positions` are places of
+    its points along the shaft [m], of the driven body alone; with `transverse_inertia` [kg*m^2] that tilts in its
+    bearings.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Body:
         "J_{INDEX}",
         "611.7 kg*mm^2",
         optional=True,
-        when="required, except for a slider on a fixed guide, which does not turn",
+        when="required, except for bodies that guides keep from turning",
         remedy="give a positive value, or delete the key for a body that does not rotate",
     )
     transverse_inertia: SceneNumber | None = positive(

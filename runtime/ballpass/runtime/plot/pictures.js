@@ -96,10 +96,14 @@ function drawLinkage(parts) {
   }));
   for (const { guide, block, direction } of parts.guides) {
     const rails = [-3.5, 3.5].map((side) => [side, draw(picture, "line", ink)]), box = draw(picture, "polygon", { fill: "var(--ring)", ...ink });
+    const apart = frames.map((k) => [0, 1].map((axis) => place(block, k)[axis] - place(guide, k)[axis]));
+    const clear = frames.filter((k) => length(apart[k]) > 0.02 * highest(apart.map(length)));
     const way = (k) => {
       if (direction) return [direction[0], -direction[1]];
-      const [a, b] = [place(guide, k), place(block, k)], size = length([b[0] - a[0], b[1] - a[1]]) || 1;
-      return [(b[0] - a[0]) / size, (b[1] - a[1]) / size];
+      // where both points meet, as in the nearest picture in which they are apart
+      const near = clear.reduce((one, other) => (Math.abs(other - k) < Math.abs(one - k) ? other : one), clear[0] ?? k);
+      const size = length(apart[near]) || 1;
+      return apart[near].map((part) => part / size);
     };
     const from = place(block, 0), along = frames.map((k) => place(block, k).reduce((sum, value, axis) => sum + (value - from[axis]) * way(0)[axis], 0));
     const span = direction ? [-highest(along.map((value) => -value)) - 8, highest(along) + 8] : [-14, 14];

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 Points = dict[tuple[str, str], Array]
 
 
+#: A guide's and a slider's point meet below this part of their largest distance.
+MEETING = 0.02
+
 #: Distance of a body's point from the figure of the others below which it belongs to that, over the picture's size.
 FLAT = 0.02
 
@@ -77,10 +80,16 @@ def _outline(keys: list[tuple[str, str]], now: Points, size: float) -> list[tupl
 def guide_direction(now: Points, trace: Points, guide: tuple[str, str], block: tuple[str, str]) -> Array:
     """Unit vector along the guide.
 
-    The slider's point stays on the line through the guide's point: one to the other.  On the frame, along the path.
+    The slider's point stays on the line through the guide's point: one to the other, or, where they meet, as in the
+    nearest pose in which they are apart.  On the frame, along the path.
     """
-    ways = (trace[block] - trace[block][0]) if guide[0] == FRAME else (now[block] - now[guide])[None, :]
-    longest = ways[int(np.argmax(np.hypot(*ways.T)))]
+    ways = trace[block] - (trace[block][0] if guide[0] == FRAME else trace[guide])
+    far = np.hypot(*ways.T)
+    longest = ways[int(np.argmax(far))]
+    if guide[0] != FRAME:
+        other = np.hypot(*(trace[block] - now[block]).T) + np.hypot(*(trace[guide] - now[guide]).T)
+        apart, clear = now[block] - now[guide], MEETING * float(np.max(far))
+        longest = apart if np.hypot(*apart) > clear else ways[int(np.argmin(np.where(far > clear, other, np.inf)))]
     length = float(np.hypot(*longest))
     return longest / length if length > 0.0 else np.array([1.0, 0.0])
 

@@ -24,12 +24,15 @@ from ballpass.derive.mechanism.kinematics import (
     Pair,
     Play,
     Pose,
+    add,
     cross,
     displaced,
     dot,
     joint_point,
     name_joint,
     name_turn,
+    quarter_turn,
+    scale,
     subscript,
     subtract,
 )
@@ -55,7 +58,8 @@ class Dyad(ABC):
     ----------
     kind : R (revolute) or P (prismatic) for each of outer joint of the first body, inner joint, outer joint of the
         second
-    branches : values of `Joint.branch` at the inner joint; the first has the sign +1
+    branches : values of `Joint.branch` at the inner joint; the first has the sign +1.  A dyad with one position has
+        one, which a scene may leave out
     words : its joints, for messages
     bodies : in the order of `kind`; where that can be read from both ends, in the order of the inner joint's bodies
     hosts : the bodies already placed that carry them
@@ -63,7 +67,7 @@ class Dyad(ABC):
     """
 
     kind: ClassVar[str]
-    branches: ClassVar[tuple[str, str]]
+    branches: ClassVar[tuple[str, ...]]
     words: ClassVar[str]
 
     bodies: tuple[str, str]
@@ -98,7 +102,7 @@ class Dyad(ABC):
     @property
     def sign(self) -> int:
         """+1 on the first of the branches, −1 on the second."""
-        return 1 if self.inner.branch == self.branches[0] else -1
+        return 1 if self.inner.branch in (None, self.branches[0]) else -1
 
     def closing(self, second: Motion, play: Play) -> Motion:
         """A point of the second body, shifted so that the loop closes as if the inner joint had no play."""
@@ -136,7 +140,7 @@ class Placement:
     spans : vectors [m] that the reactions need; each kind says which
     determinant : of the 2×2 systems for rates and forces
     margin : where it can be assembled
-    guide : of its prismatic joint, None where it has none
+    guides : of its prismatic joints
     """
 
     dyad: Dyad
@@ -144,7 +148,7 @@ class Placement:
     spans: tuple[Pair, ...]
     determinant: sp.Expr
     margin: Margin
-    guide: Guide | None = None
+    guides: tuple[Guide, ...] = ()
 
 
 def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose, play: Play) -> Motion:
@@ -160,6 +164,29 @@ def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose, p
     moved = displaced(motion, play[joint.name], 1 if joint.bodies[1] == body else -1)
     words, mark = f"joint {joint.name} on {body}", f"{subscript(joint.name)},{subscript(body)}"
     return ledger.name_motion(f"joint.{joint.name}.{body}", moved, words, mark)
+
+
+def name_path(
+    ledger: Ledger, mechanism: Mechanism, inner: Joint, guide: Joint, host: Pose, slider: str, point: Pair
+) -> Motion:
+    """Motion of the place on the host where a point of the slider [m] is while both points of the guide coincide.
+
+    `inner` names the joint that is at this point.
+    """
+    rail, shoe = (joint_point(mechanism, guide, body) for body in (host.body, slider))
+    words = f"the path of joint {inner.name} where the points of {guide.name} coincide"
+    path = host.motion(add(rail, subtract(point, shoe)))
+    return ledger.name_motion(f"joint.{guide.name}.base", path, words, f"0,{subscript(guide.name)}")
+
+
+def slid(fellow: Motion, rate: sp.Expr, direction: Pair, speed: sp.Expr, acceleration: sp.Expr) -> Motion:
+    """Motion of a point that slides over a body, whose point there has the motion `fellow`, and which turns."""
+    coriolis = scale(2 * rate * speed, quarter_turn(direction))
+    return Motion(
+        position=fellow.position,
+        velocity=add(fellow.velocity, scale(speed, direction)),
+        acceleration=add(fellow.acceleration, coriolis, scale(acceleration, direction)),
+    )
 
 
 def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:
@@ -275,6 +302,24 @@ def name_travel(
     unit, accent = {"": ("m", "s"), "speed": ("m/s", r"\dot{s}"), "acceleration": ("m/s^2", r"\ddot{s}")}[order]
     word, latex = order or "travel", f"{accent}_{{{subscript(guide.name)}}}"
     return ledger.name(f"joint.{guide.name}.{word}", value, unit, f"{word} of {slider} along guide {guide.name}", latex)
+
+
+def name_travels(
+    ledger: Ledger,
+    guides: tuple[tuple[Joint, str, Pair], tuple[Joint, str, Pair]],
+    order: Literal["", "speed", "acceleration"],
+    way: Pair,
+    determinant: sp.Expr,
+) -> tuple[sp.Expr, sp.Expr]:
+    """Name the components of a vector along two guides: joint, slider and direction of each.
+
+    `determinant` is the cross product of both directions.
+    """
+    one, two = guides
+    return (
+        name_travel(ledger, one[0], one[1], order, cross(way, two[2]) / determinant),
+        name_travel(ledger, two[0], two[1], order, cross(one[2], way) / determinant),
+    )
 
 
 def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> Pair:

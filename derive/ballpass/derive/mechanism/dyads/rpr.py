@@ -54,7 +54,7 @@ class RPR(Dyad):
     """
 
     kind: ClassVar[str] = "RPR"
-    branches: ClassVar[tuple[str, str]] = ("ahead", "behind")
+    branches: ClassVar[tuple[str, ...]] = ("ahead", "behind")
     words: ClassVar[str] = "the joint between them prismatic"
 
     def branch_meaning(self) -> str:
@@ -122,7 +122,7 @@ class RPR(Dyad):
             poses=(lever, block),
             spans=(span,),
             determinant=reach,
-            guide=Guide(joint=guide, host=first, slider=second, direction=direction, travel=travel, fixed=False),
+            guides=(Guide(joint=guide, host=first, slider=second, direction=direction, travel=travel),),
             margin=Margin(
                 joint=guide.name,
                 expression=(square - offset**2) / (square + dot(arms[0], arms[0]) + dot(arms[1], arms[1])),
@@ -133,8 +133,7 @@ class RPR(Dyad):
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
         """Inner joint: moments of both bodies about their hinges, together and of the second; hinges: forces."""
-        guide, (first, second), (one, two) = placement.guide, self.bodies, self.outer
-        assert guide is not None
+        (guide,), (first, second), (one, two) = placement.guides, self.bodies, self.outer
         moments = balance.name_moment(ledger, first, one) + balance.name_moment(ledger, second, two)
         # f n on the second body, −f n on the first: moments about P1 of both, d × (f n) = x f, and K1 + K2 of the rest.
         balance.solve_guide(ledger, guide, moments / placement.determinant, about=balance.point(two, second))

@@ -23,15 +23,16 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_direction,
     name_gap,
     name_hinge,
+    name_path,
     name_rate,
     name_span,
     name_travel,
+    slid,
     span_length,
     turn_by_span,
 )
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
-    Motion,
     Play,
     Pose,
     Turn,
@@ -47,7 +48,7 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.records import FRAME, Mechanism
+from ballpass.derive.scene.records import Mechanism
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +61,7 @@ class RRP(Dyad):
     """
 
     kind: ClassVar[str] = "RRP"
-    branches: ClassVar[tuple[str, str]] = ("ahead", "behind")
+    branches: ClassVar[tuple[str, ...]] = ("ahead", "behind")
     words: ClassVar[str] = "one of the outer joints prismatic"
 
     def branch_meaning(self) -> str:
@@ -80,13 +81,8 @@ class RRP(Dyad):
         start, span = body_span(mechanism, rod, hinge_joint, inner)
         length = span_length(ledger, rod, span)
 
-        # The inner joint's path is the line through `base` along the guide, both carried by the host.
         slider_inner = joint_point(mechanism, inner, slider)
-        slider_guide = joint_point(mechanism, guide_joint, slider)
-        host_guide = joint_point(mechanism, guide_joint, host.body)
-        path = host.motion(add(host_guide, subtract(slider_inner, slider_guide)))
-        words = f"the path of joint {inner.name} where the points of {guide_joint.name} coincide"
-        path = ledger.name_motion(f"joint.{guide_joint.name}.base", path, words, f"0,{subscript(guide_joint.name)}")
+        path = name_path(ledger, mechanism, inner, guide_joint, host, slider, slider_inner)
         direction = name_direction(ledger, guide_joint, host.rotate(guide_axis(guide_joint)))
         normal = quarter_turn(direction)
 
@@ -121,33 +117,17 @@ class RRP(Dyad):
         gap = name_gap(ledger, inner, "a", closure, "m/s^2")
         acceleration = name_acceleration(ledger, rod, cross(direction, gap) / reach)
         quickening = name_travel(ledger, guide_joint, slider, "acceleration", -dot(v, gap) / reach)
-        joint_motion = name_joint(
-            ledger,
-            inner,
-            Motion(
-                position=fellow.position,
-                velocity=add(fellow.velocity, scale(speed, direction)),
-                acceleration=add(fellow.acceleration, coriolis, scale(quickening, direction)),
-            ),
-        )
+        joint_motion = name_joint(ledger, inner, slid(fellow, host.rate, direction, speed, quickening))
 
         turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration)
         rod_pose = place(ledger, mechanism, rod, turn, start, hinge)
         slider_pose = place(ledger, mechanism, slider, host, slider_inner, joint_motion)
-        guide = Guide(
-            joint=guide_joint,
-            host=host.body,
-            slider=slider,
-            direction=direction,
-            travel=travel,
-            fixed=host.body == FRAME,
-        )
         return Placement(
             dyad=self,
             poses=(rod_pose, slider_pose),
             spans=(v,),
             determinant=reach,
-            guide=guide,
+            guides=(Guide(joint=guide_joint, host=host.body, slider=slider, direction=direction, travel=travel),),
             margin=Margin(
                 joint=inner.name,
                 expression=(length - offset) * (length + offset) / length**2,
@@ -157,8 +137,7 @@ class RRP(Dyad):
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
         """Inner joint: moment of the rod about its hinge, balance of the slider along the guide; then the rest."""
-        guide, (rod, slider), (v,) = placement.guide, self.bodies, placement.spans
-        assert guide is not None
+        (guide,), (rod, slider), (v,) = placement.guides, self.bodies, placement.spans
         moment = balance.name_moment(ledger, rod, self.outer[0])
         push = ledger.name(
             f"body.{slider}.known_push",

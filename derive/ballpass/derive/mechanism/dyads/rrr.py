@@ -54,7 +54,7 @@ class RRR(Dyad):
     """
 
     kind: ClassVar[str] = "RRR"
-    branches: ClassVar[tuple[str, str]] = ("left", "right")
+    branches: ClassVar[tuple[str, ...]] = ("left", "right")
     words: ClassVar[str] = "three revolute joints"
 
     def branch_meaning(self) -> str:

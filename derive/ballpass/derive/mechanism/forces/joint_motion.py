@@ -88,8 +88,8 @@ class JointTravel(JointMotion):
 
     def along(self, joint: Joint, setting: Setting) -> Action:
         """Rate of the travel; both points of the joint lie on one line along the guide, in which the force acts."""
-        guides = (placement.guide for placement in setting.linkage.placements)
-        guide = next(guide for guide in guides if guide is not None and guide.joint == joint)
+        guides = (guide for placement in setting.linkage.placements for guide in placement.guides)
+        guide = next(guide for guide in guides if guide.joint == joint)
         places = [joint_point(setting.linkage.mechanism, joint, body) for body in joint.bodies]
         one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(joint.bodies, places, strict=True))
         return Action(
