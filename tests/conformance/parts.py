@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from coupled_scenes import RUN, bearing, linkage_text
-from linkages import MACHINES
+from linkages import GEARED, MACHINES
 from quick_cases import long_but
 
 from ballpass.derive.bearing.effects import EFFECTS
@@ -21,6 +21,8 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.drive.laws import LAWS as DRIVES
 from ballpass.derive.mechanism.dyads import DYADS
 from ballpass.derive.mechanism.forces import FORCE_TABLES
+from ballpass.derive.scene.read_keys import keys_of
+from ballpass.derive.scene.records import Gear
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,6 +40,7 @@ REGISTERED: Mapping[str, set[str]] = {
     "force": {kind_of_force(t.key, pathway, law) for t in FORCE_TABLES for pathway in t.pathways for law in t.laws},
     "dyad": {dyad.kind for dyad in DYADS},
     "shaft": {"tilting"},
+    "gear": {*keys_of(Gear)["type"].choices},
 }
 
 
@@ -386,6 +389,23 @@ def _shafts() -> list[Part]:
     return [Part(registry="shaft", name="tilting", text=f"{text}[run]{run}", docs=docs)]
 
 
+# gears, in a machine with a bearing that moves it
+
+
+def _gears() -> list[Part]:
+    machines = {"external": ("geared five-bar", "D", "right"), "internal": ("planetary", "B", "rod")}
+    machines["belt"] = ("five-bar with a belt", "D", "right")
+    return [
+        Part(
+            registry="gear",
+            name=kind,
+            text=linkage_text(GEARED[name]()) + bearing(joint, body, elastic=True) + RUN,
+            docs=("reference/scene.md", f'"{kind}"'),
+        )
+        for kind, (name, joint, body) in machines.items()
+    ]
+
+
 # scenes without states: a driver at constant speed, and no bearing
 
 _SLIDER_CRANK = """
@@ -476,9 +496,11 @@ QUICK = (
         "force springs TwoPoints SpringDamper",
     ),
     *("force stops TwoPoints Stop", "force friction JointTurn Friction", "dyad RRR", "dyad RPR", "dyad RPP"),
-    "shaft tilting",
+    *("gear external", "shaft tilting"),
 )
-PARTS: tuple[Part, ...] = (*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads(), *_shafts())
+PARTS: tuple[Part, ...] = (
+    *(*_laws(), *_elements(), *_effects(), *_drives(), *_forces(), *_dyads(), *_gears(), *_shafts()),
+)
 
 
 def cases(parts: Iterable[Part] = PARTS) -> list[Any]:

@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 from linkages import (
     DEGREE,
+    GEARED,
     MACHINES,
     Machine,
     crank_slider,
@@ -194,6 +195,7 @@ CASES = {
     ),
     "yoke on a moving body": (yoke_on_rocker, ()),
     "rapson's slide": (rapson_slide, ("G",)),
+    **{name: (make, ()) for name, make in GEARED.items()},
 }
 
 

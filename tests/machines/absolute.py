@@ -17,7 +17,7 @@ import numpy as np
 
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import Vector
-from ballpass.derive.scene.records import FRAME, Joint, Scene
+from ballpass.derive.scene.records import FRAME, Gear, Joint, Scene
 
 Array = np.ndarray
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -185,6 +185,13 @@ class Absolute:
                 )
                 rest.append(0.0)
             rates += [0.0, 0.0]
+        for gear in self.mechanism.gears:
+            where[gear.name] = slice(len(residual), len(residual) + 1)
+            row, offset = self.ratio(gear)
+            residual.append(row @ q - offset)
+            rows.append(row)
+            rates.append(0.0)
+            rest.append(0.0)
         where["driver"] = slice(len(residual), len(residual) + 1)
         driven = self.row(self.driven)
         residual.append(driven @ q - angle)
@@ -192,6 +199,30 @@ class Absolute:
         rates.append(rate)
         rest.append(self.acceleration)
         return np.array(residual), np.array(rows), np.array(rates), np.array(rest), where
+
+    def ratio(self, gear: Gear) -> tuple[Array, float]:
+        """What a gear keeps: a linear form of the angles, and its value."""
+        sense = -1.0 if gear.kind == "external" else 1.0
+        turned = [self.row(body) - self.row(self.carrier(gear)) for body in gear.bodies]
+        first, second = self.value(gear.first_angle), self.value(gear.second_angle)
+        ratio = sense * gear.teeth[0] / gear.teeth[1]
+        return turned[1] - ratio * turned[0], second - ratio * first
+
+    def carrier(self, gear: Gear) -> str:
+        """The body hinged to both wheels, or to one of them and to the frame, which holds the other one."""
+        near = [{joint.other(body) for joint in self._hinges(body)} for body in gear.bodies]
+        both = sorted((near[0] & near[1]) - {*gear.bodies}, key=lambda body: body != FRAME)
+        arms = [b for b in self.bodies if b not in gear.bodies and any(b in held for held in near)]
+        return next(iter([*both, *(b for b in arms if any(FRAME in joint.bodies for joint in self._hinges(b)))]))
+
+    def _hinges(self, body: str) -> list[Joint]:
+        return [j for j in self.mechanism.joints if j.kind == "revolute" and body in j.bodies]
+
+    def axle(self, gear: Gear, body: str, q: Array) -> Array:
+        """A place on the axis of a wheel."""
+        carrier = self.carrier(gear)
+        held = sorted(self._hinges(body), key=lambda joint: (carrier not in joint.bodies, FRAME not in joint.bodies))
+        return self.at(held[0], body, q, np.zeros(self.size)).position
 
     def play(self, bearing: Bearing, q: Array, v: Array) -> tuple[Place, Place, Place]:
         """Points of a bearing: of the inner ring's body, of the housing's body, and the centre of the outer ring."""
@@ -222,7 +253,15 @@ class Absolute:
                 q[3 * k + 2] = math.atan2(world[1], world[0]) - math.atan2(local[1], local[0])
             q[3 * k : 3 * k + 2] = at - rotation(q[3 * k + 2]) @ arm[:2]
         q[3 * self.bodies.index(self.driven) + 2] = self.start
+        for gear in self.mechanism.gears:  # whole turns of the later wheel
+            row, offset = self.ratio(gear)
+            wheel = max((body for body in gear.bodies if body != FRAME), key=self._place_of)
+            place = 3 * self.bodies.index(wheel) + 2
+            q[place] -= TURN * round(float(row @ q - offset) / row[place] / TURN)
         return q
+
+    def _place_of(self, body: str) -> int:
+        return -1 if body == self.driven else self.bodies.index(body)
 
     def _points(self, body: str) -> list[str]:
         return [p.name for p in self.mechanism.body(body).points]

@@ -256,6 +256,11 @@ def linkage_text(machine: Machine) -> str:
         lines.append(f"points = {list(joint.points)}")
         lines += [f"direction = {amount(joint.direction)}"] if joint.direction is not None else []
         lines += [f'branch = "{joint.branch}"'] if joint.branch is not None else []
+    for gear in mechanism.gears:
+        lines += [f"[mechanism.gears.{gear.name}]", f'type = "{gear.kind}"', f"bodies = {list(gear.bodies)}"]
+        lines += [f"teeth = {list(gear.teeth)}", f"pressure_angle = {amount(gear.pressure_angle)}"]
+        lines += [f"radius = {amount(gear.radius)}"] if gear.radius is not None else []
+        lines += [f"first_angle = {amount(gear.first_angle)}", f"second_angle = {amount(gear.second_angle)}"]
     for force in mechanism.forces:
         lines += [f"[mechanism.{force.table}.{force.name}]", f'body = "{force.pathway.body}"']
         if isinstance(force.pathway, PointForce):

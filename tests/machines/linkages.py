@@ -16,7 +16,7 @@ from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
+from ballpass.derive.scene.records import Body, Driver, Force, Gear, Joint, Mechanism, NamedPoint
 from ballpass.derive.terms import TIME
 from ballpass.runtime.contract.manifest import TurningInfo
 
@@ -147,6 +147,7 @@ def build(
     gravity: Place = 9.81,
     forces: Mapping[str, tuple[str, str, Place]] | None = None,
     torques: Mapping[str, tuple[str, float]] | None = None,
+    gears: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Machine:
     numbers = Numbers()
     root = "mechanism"
@@ -183,6 +184,7 @@ def build(
             )
             for name, (body, torque) in (torques or {}).items()
         ),
+        gears=tuple(_gear(numbers, name, data) for name, data in (gears or {}).items()),
     )
     return Machine(mechanism=mechanism, values=numbers.values)
 
@@ -196,6 +198,21 @@ def _body(numbers: Numbers, name: str, data: Mapping[str, Any]) -> Body:
         inertia=None if inertia is None else numbers.quantity(f"{path}.inertia", inertia, "kg*m^2"),
         center_of_mass=numbers.vector(f"{path}.center_of_mass", data.get("center"), "m"),
         points=numbers.points(path, data["points"]),
+    )
+
+
+def _gear(numbers: Numbers, name: str, data: Mapping[str, Any]) -> Gear:
+    path, pressure = f"mechanism.gears.{name}", data.get("pressure", 20 * DEGREE)
+    first, second = (numbers.quantity(f"{path}.{w}_angle", data.get(w, 0.0), "rad") for w in ("first", "second"))
+    return Gear(
+        name=name,
+        kind=data.get("kind", "external"),
+        bodies=data["bodies"],
+        teeth=data["teeth"],
+        pressure_angle=numbers.quantity(f"{path}.pressure_angle", pressure, "rad"),
+        first_angle=first,
+        second_angle=second,
+        radius=numbers.quantity(f"{path}.radius", data["radius"], "m") if "radius" in data else None,
     )
 
 
@@ -572,4 +589,141 @@ MACHINES = {
     "yoke on a moving body": yoke_on_rocker,
     "rapson's slide": rapson_slide,
     "rapson's slide, guide on the ram": lambda: rapson_slide(guide_on_ram=True),
+}
+
+
+def _wheel(**points: Place) -> dict[str, Any]:
+    return {"mass": 0.9, "inertia": 2e-3, "center": ("xy", 0.012, -0.003), "points": {"axis": None, **points}}
+
+
+def _rod(length: float, *names: str) -> dict[str, Any]:
+    points: dict[str, Place] = dict(zip(names, (None, length), strict=True))
+    return {"mass": 0.4, "inertia": 1e-3, "center": ("xy", 0.06, 0.01), "points": points}
+
+
+def geared_five_bar(teeth: tuple[int, int] = (20, 40), turned: bool = False) -> Machine:
+    """Two cranks in mesh, and two rods between them."""
+    wheels = ("wheel", "crank") if turned else ("crank", "wheel")
+    return build(
+        frame={"A": ("xy", 0.01, 0.02), "E": ("xy", 0.12, 0.03)},
+        bodies={
+            "crank": _wheel(B=0.03),
+            "wheel": _wheel(D=0.025),
+            "left": _rod(0.13, "B", "C"),
+            "right": _rod(0.12, "D", "C"),
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank"), "points": ("A", "axis")},
+            "B": {"bodies": ("crank", "left")},
+            "C": {"bodies": ("left", "right"), "branch": "left"},
+            "D": {"bodies": ("wheel", "right")},
+            "E": {"bodies": ("wheel", "frame"), "points": ("axis", "E")},
+        },
+        gears={"G": {"bodies": wheels, "teeth": teeth[::-1] if turned else teeth, "first": 0.3, "second": 1.2}},
+        torques={"brake": ("wheel", 3.0)},
+        forces={"push": ("left", "C", ("xy", 40.0, -65.0))},
+        speed=30.0,
+    )
+
+
+def belted_five_bar(teeth: tuple[int, int] = (30, 90)) -> Machine:
+    """The same with a belt, whose pulleys are smaller than the distance of their axes."""
+    machine = geared_five_bar()
+    numbers = Numbers(machine.values)
+    gear = _gear(numbers, "G", {"kind": "belt", "bodies": ("crank", "wheel"), "teeth": teeth, "radius": 0.015})
+    return Machine(mechanism=replace(machine.mechanism, gears=(gear,)), values=numbers.values)
+
+
+def reduced_press() -> Machine:
+    """Pinion, idler and ring on the frame; the ring drives a slider."""
+    return build(
+        frame={"A": None, "I": ("xy", 0.05, 0.01), "E": ("xy", 0.12, 0.02), "guide": ("xy", 0.1, -0.02)},
+        bodies={
+            "pinion": _wheel(),
+            "idler": _wheel(),
+            "ring": _wheel(B=0.04),
+            "rod": _rod(0.2, "B", "C"),
+            "ram": {"mass": 3.0, "points": {"C": None}},
+        },
+        joints={
+            "A": {"bodies": ("frame", "pinion"), "points": ("A", "axis")},
+            "I": {"bodies": ("frame", "idler"), "points": ("I", "axis")},
+            "E": {"bodies": ("frame", "ring"), "points": ("E", "axis")},
+            "B": {"bodies": ("ring", "rod")},
+            "C": {"bodies": ("rod", "ram"), "branch": "ahead"},
+            "G": {"bodies": ("frame", "ram"), "points": ("guide", "C"), "direction": 270 * DEGREE},
+        },
+        gears={
+            "one": {"bodies": ("pinion", "idler"), "teeth": (18, 27), "second": 0.4},
+            "two": {"kind": "internal", "bodies": ("ring", "idler"), "teeth": (90, 27), "pressure": 0.3},
+        },
+        forces={"punch": ("ram", "C", ("xy", 0.0, 900.0))},
+        speed=50.0,
+    )
+
+
+def planetary(sun_hinged_to: str = "arm") -> Machine:
+    """An arm turns a planet about a fixed sun; the planet turns a second sun, and its pin a slider."""
+    held = {"arm": ("arm", "sun"), "frame": ("frame", "sun")}[sun_hinged_to]
+    return build(
+        frame={"O": ("xy", 0.01, 0.02), "guide": ("xy", 0.1, -0.02)},
+        bodies={
+            "arm": {
+                "mass": 0.5,
+                "inertia": 6e-4,
+                "center": ("xy", 0.02, 0.006),
+                "points": {"O": ("xy", 0.003, 0.002), "P": ("xy", 0.06, 0.01)},
+            },
+            "planet": _wheel(B=0.02),
+            "sun": {"mass": 1.3, "inertia": 4e-3, "points": {"O": None, "mark": 0.02}},
+            "rod": _rod(0.25, "B", "C"),
+            "ram": {"mass": 3.0, "points": {"C": None}},
+        },
+        joints={
+            "A": {"bodies": ("frame", "arm"), "points": ("O", "O")},
+            "S": {"bodies": held, "points": ("O", "O")},
+            "P": {"bodies": ("arm", "planet"), "points": ("P", "axis")},
+            "B": {"bodies": ("planet", "rod")},
+            "C": {"bodies": ("rod", "ram"), "branch": "ahead"},
+            "G": {"bodies": ("frame", "ram"), "points": ("guide", "C"), "direction": -20 * DEGREE},
+        },
+        gears={
+            "fixed": {"bodies": ("frame", "planet"), "teeth": (36, 24), "second": 0.4},
+            "free": {"kind": "internal", "bodies": ("planet", "sun"), "teeth": (20, 60)},
+        },
+        forces={"punch": ("ram", "C", ("xy", 50.0, 90.0))},
+        torques={"load": ("sun", 2.0)},
+        speed=20.0,
+    )
+
+
+def sector() -> Machine:
+    """A four-bar whose rocker turns a pinion to and fro."""
+    machine = four_bar()
+    further = build(
+        frame={"F": ("xy", 0.25, -0.04)},
+        bodies={"pinion": _wheel(mark=0.02)},
+        joints={"F": {"bodies": ("frame", "pinion"), "points": ("F", "axis")}},
+        gears={"G": {"bodies": ("pinion", "rocker"), "teeth": (15, 40), "first": -0.5, "second": 2.0}},
+        torques={"load": ("pinion", -0.4)},
+        speed=30.0,
+    )
+    one, two = machine.mechanism, further.mechanism
+    both = {
+        name: getattr(one, name) + getattr(two, name)
+        for name in ("frame_points", "bodies", "joints", "forces", "gears")
+    }
+    return Machine(mechanism=replace(one, **both), values={**machine.values, **further.values})
+
+
+#: Machines with gears.
+GEARED = {
+    "geared five-bar": geared_five_bar,
+    "geared five-bar, gear the other way round": lambda: geared_five_bar((28, 21), turned=True),
+    "five-bar with a belt": belted_five_bar,
+    "five-bar with a belt of alike pulleys": lambda: belted_five_bar((30, 30)),
+    "press with a reduction": reduced_press,
+    "planetary": planetary,
+    "planetary, sun on the frame": lambda: planetary("frame"),
+    "sector": sector,
 }

@@ -27,7 +27,7 @@ from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.scene.bearing_records import Bearing, GivenContact
-from ballpass.derive.scene.records import FRAME
+from ballpass.derive.scene.records import FRAME, Gear
 
 
 @dataclass
@@ -343,7 +343,15 @@ class Multibody(Absolute):
         if self.motor is not None:
             pushed += self.torque(rate) * self.row(self.driven)
             rows, rest = rows[:-1], rest[:-1]  # the driver's comes last
-        a, multipliers = self._solve(rows, pushed, rest)
+        a, multipliers = self._solve(rows, rows, pushed, rest)
+        sides = {gear.name: 1.0 for gear in self.mechanism.gears}
+        for gear in self.mechanism.gears * 2:  # the flank that pushes
+            teeth = rows.copy()
+            for one in self.mechanism.gears:
+                teeth[where[one.name]] = self.pressure(one, q, sides[one.name])[0]
+            a, multipliers = self._solve(rows, teeth, pushed, rest)
+            if multipliers[where[gear.name]][0] < 0.0:
+                sides[gear.name] *= -1.0
         held = self.motor is None
         outputs = {"drive_torque": float(multipliers[where["driver"]][0]) if held else self.torque(rate)}
         for joint in self.mechanism.joints:
@@ -362,6 +370,10 @@ class Multibody(Absolute):
                 reaction = -push * np.array([-math.sin(alpha), math.cos(alpha)])
                 outputs[f"reaction.{joint.name}.moment"] = -moment
             outputs |= {f"reaction.{joint.name}.{axis}": float(f) for axis, f in zip("xy", reaction, strict=True)}
+        for gear in self.mechanism.gears:
+            (size,), along = multipliers[where[gear.name]], self.pressure(gear, q, sides[gear.name])[1]
+            outputs |= {f"reaction.{gear.name}.{axis}": float(size * f) for axis, f in zip("xy", along, strict=True)}
+            outputs[f"gear.{gear.name}.force"] = float(size)
         found = {} if not self.free else {"driver.angle": float(self.row(self.driven) @ a)}
         for bearing in self.bearings:
             prefix = bearing.prefix
@@ -379,11 +391,36 @@ class Multibody(Absolute):
                 found[f"{prefix}cage.lag_integral"] = float(lost @ [self.row(body) @ v for body in bodies])
         return Found(found, outputs, a)
 
-    def _solve(self, rows: Array, pushed: Array, rest: Array) -> tuple[Array, Array]:
-        """Accelerations and multipliers, scaled by the masses; one step of refinement."""
+    def pressure(self, gear: Gear, q: Array, side: float) -> tuple[Array, Array]:
+        """Along the line of pressure on the first wheel: the generalized forces of a force, and its direction."""
+        ends = [self.axle(gear, body, q) for body in gear.bodies]
+        across, sense = ends[1] - ends[0], 1.0 if gear.kind == "internal" else -1.0
+        pitch_point = ends[0]
+        if gear.kind != "belt":
+            pitch_point = ends[0] + gear.teeth[0] / (gear.teeth[0] - sense * gear.teeth[1]) * across
+        alpha, along = self.value(gear.pressure_angle), across / np.linalg.norm(across)
+        line = side * math.cos(alpha) * QUARTER @ along + sense * math.sin(alpha) * along
+        if gear.kind == "belt":  # along the common tangent of both circles, on one of its sides
+            first, apart = self.value(gear.radius), np.linalg.norm(across)
+            radii = first, first * gear.teeth[1] / gear.teeth[0]
+            tilt = math.asin((radii[1] - radii[0]) / apart)
+            line = rotation(-side * tilt) @ along
+            pitch_point = ends[0] + radii[0] * side * (-QUARTER @ line)
+        slopes = []
+        for body in gear.bodies:
+            k = 0 if body == FRAME else 3 * self.bodies.index(body)
+            arm = pitch_point if body == FRAME else rotation(-q[k + 2]) @ (pitch_point - q[k : k + 2])
+            slopes.append(self.place(body, arm, q, np.zeros(self.size)).jacobian)
+        return line @ (slopes[0] - slopes[1]), line
+
+    def _solve(self, rows: Array, forces: Array, pushed: Array, rest: Array) -> tuple[Array, Array]:
+        """Accelerations and multipliers, scaled by the masses; one step of refinement.
+
+        `forces` are those of the constraints in `rows`, which do no work.
+        """
         count = len(rest)
         scale = np.sqrt(self.masses())
-        matrix = np.block([[np.eye(self.size), -(rows / scale).T], [rows / scale, np.zeros((count, count))]])
+        matrix = np.block([[np.eye(self.size), -(forces / scale).T], [rows / scale, np.zeros((count, count))]])
         right = np.concatenate([pushed / scale, rest])
         found = np.linalg.solve(matrix, right)
         exact = matrix.astype(np.longdouble), right.astype(np.longdouble)

@@ -71,7 +71,7 @@ def bearing_outputs(bearing: BearingModel, load: Pair | None) -> list[Output]:
 def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
     """Outputs of a mechanism, in the order of listing: reactions, drive, angles of the bodies."""
     rows: list[Words] = []
-    for joint in linkage.mechanism.joints:
+    for joint in linkage.contacts:
         name, (first, second) = joint.name, joint.bodies
         for axis, force in zip("xy", reactions.joint_force[name], strict=True):
             words = f"Force of the {second} on the {first} at {name} along {axis}"
@@ -79,6 +79,9 @@ def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
         if name in reactions.joint_moment:
             words = f"Moment of the {second} on the {first} at {name}"
             rows.append((f"reaction.{name}.moment", reactions.joint_moment[name], "N*m", words))
+    for gear in linkage.mechanism.gears:
+        name, words = f"gear.{gear.name}.force", f"Force of gear {gear.name} along its line of action"
+        rows.append((name, sp.Symbol(name, real=True), "N", words))
     drive = linkage.drive
     torque = reactions.drive_torque if drive.torque is None else drive.torque
     rows.append(("drive_torque", torque, "N*m", "Torque of the drive on the driven body, counter-clockwise"))

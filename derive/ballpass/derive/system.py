@@ -264,6 +264,7 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
         if linked is None:
             return None
         linkage, forces = linked
+        drive = drive.repeating(linkage.turns)
         carriers = [carriers_of(bearing, linkage) for bearing in bearings]
         swings = {body: swing_of(linkage, body) for pair in carriers for body in pair}
         rings = [(swings[inner], swings[outer]) for inner, outer in carriers]

@@ -6,7 +6,7 @@ from ballpass.derive.drive.known import KnownDrive, known_drive, shaft_drive
 from ballpass.derive.drive.laws import LAWS
 from ballpass.derive.scene.records import Scene
 
-__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of"]
+__all__ = ["LAWS", "Drive", "KnownDrive", "OverAngle", "drive_of", "known_drive"]
 
 
 def drive_of(scene: Scene) -> Drive:

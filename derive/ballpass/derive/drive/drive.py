@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import sympy as sp
 
@@ -57,6 +58,11 @@ class Drive(ABC):
     torque: sp.Expr | None = None
     flywheel: sp.Expr = sp.S.Zero
     smoothness: Smoothness = Smoothness.TWICE_SMOOTH
+
+    def repeating(self, turns: int) -> Self:
+        """The drive of a machine that repeats after so many turns: its angle is known within these."""
+        inputs = tuple(replace(one, turns=turns) if one.kind == "phase" else one for one in self.inputs)
+        return replace(self, inputs=inputs)
 
     @property
     def even(self) -> bool:

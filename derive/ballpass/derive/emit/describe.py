@@ -96,6 +96,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         rate=driven.velocity.name if driven is not None else "",
         driver=mechanism.driver.joint,
         turns=tuple((f.label, f.law.turns) for f in mechanism.forces if getattr(f.law, "turns", 1) > 1),
+        repeats=linkage.turns,
         springs=drawn_springs(mechanism),
     )
 

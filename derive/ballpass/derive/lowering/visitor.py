@@ -260,14 +260,16 @@ class Visitor:
 
         if isinstance(expression, Ideal):
             return at(expression.args[1])(expression.args[0])
-        angles = [2.0 * ca.pi * k / POINTS for k in range(POINTS)]
+        period = int(expression.args[2 if isinstance(expression, Turns) else 3])
+        count = period * POINTS
+        angles = [2.0 * ca.pi * k / POINTS for k in range(count)]
         cos, sin = zip(
             *((visit(expression.args[0]), visit(expression.args[1])) for visit in map(at, angles)), strict=True
         )
-        pairs = [(k, (k + 1) % POINTS) for k in range(POINTS)]
+        pairs = [(k, (k + 1) % count) for k in range(count)]
         if isinstance(expression, Turns):
             turned = [ca.atan2(cos[i] * sin[j] - sin[i] * cos[j], cos[i] * cos[j] + sin[i] * sin[j]) for i, j in pairs]
-            whole = ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5)
+            whole = ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5) / period
             most = reduce(ca.fmax, (ca.fabs(step) for step in turned))
             return ca.SX(ca.if_else(most < FARTHEST, whole, ca.inf))
         turns = self(expression.args[2])

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from ballpass.derive.mechanism.dyads import DYADS, Dyad
+from ballpass.derive.mechanism.dyads import DYADS, Dyad, Group
+from ballpass.derive.mechanism.gear import carriers, next_gear
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
 
@@ -20,11 +21,11 @@ LARGEST_GROUP = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assembly:
-    """The driver joint, the body it drives, and the dyads in the order in which they are placed."""
+    """The driver joint, the body it drives, and the dyads and wheels in the order in which they are placed."""
 
     driver: Joint
     driven: str
-    dyads: tuple[Dyad, ...]
+    dyads: tuple[Group, ...]
 
 
 def assemble(mechanism: Mechanism) -> Assembly:
@@ -41,14 +42,15 @@ def assemble(mechanism: Mechanism) -> Assembly:
         raise LinkageError(faults)
     driver = mechanism.joint(mechanism.driver.joint)
     driven = driver.other(FRAME)
-    placed, dyads = [FRAME, driven], list[Dyad]()
-    while (dyad := _next_dyad(mechanism, placed)) is not None:
+    placed, dyads = [FRAME, driven], list[Group]()
+    while (dyad := next_gear(mechanism, placed) or _next_dyad(mechanism, placed)) is not None:
         dyads.append(dyad)
         placed.extend(dyad.bodies)
     left_over = [b.name for b in mechanism.bodies if b.name not in placed]
     if left_over:
         raise LinkageError([_order_fault(mechanism, placed, left_over)])
-    faults = [*_idle_faults(driven, dyads), *_branch_faults(mechanism, dyads)]
+    pairs = [dyad for dyad in dyads if isinstance(dyad, Dyad)]
+    faults = [*_idle_faults(driven, dyads), *_branch_faults(mechanism, pairs)]
     if faults:
         raise LinkageError(faults)
     return Assembly(driver=driver, driven=driven, dyads=tuple(dyads))
@@ -59,8 +61,8 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _mobility_faults(mechanism: Mechanism) -> list[Fault]:
-    bodies, joints = len(mechanism.bodies), len(mechanism.joints)
-    unknowns, equations = 3 * bodies, 2 * joints
+    bodies, joints, gears = len(mechanism.bodies), len(mechanism.joints), len(mechanism.gears)
+    unknowns, equations = 3 * bodies, 2 * joints + gears
     if unknowns - equations == 1:
         return []
     if unknowns - equations < 1:
@@ -72,7 +74,8 @@ def _mobility_faults(mechanism: Mechanism) -> list[Fault]:
             key="mechanism.joints",
             problem=(
                 f"the linkage has mobility {unknowns - equations}: {unknowns} unknowns "
-                f"(3 for each of {bodies} moving bodies) and {equations} equations (2 for each of {joints} joints)"
+                f"(3 for each of {bodies} moving bodies) and {equations} equations (2 for each of {joints} joints"
+                + (f", 1 for each of {gears} gears)" if gears else ")")
             ),
             given=(
                 f"bodies {_listed([b.name for b in mechanism.bodies])}; "
@@ -129,6 +132,8 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
         for body in left_over
         if len(held_by := _joints_to(mechanism, body, placed)) > 1
     ]
+    gears = [gear for gear in mechanism.gears if {*gear.bodies} & {*left_over}]
+    held += [f"gear {gear.name} has no body that carries both axes" for gear in gears if not carriers(mechanism, gear)]
     loose = [body for body in left_over if not _joints_to(mechanism, body, placed)]
     if len(loose) == len(left_over):
         held.append("none of them has a joint to a body already placed")
@@ -143,12 +148,15 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
         key="mechanism.joints",
         problem=(
             f"no dyad places the bodies {_listed(left_over)}: {3 * len(left_over)} unknowns (3 for each body) and "
-            f"{2 * len(joints)} equations (2 for each of the joints {_listed([j.name for j in joints])}){reason}"
+            f"{2 * len(joints) + len(gears)} equations (2 for each of the joints {_listed([j.name for j in joints])}"
+            + (f", 1 for each of the gears {_listed([gear.name for gear in gears])}" if gears else "")
+            + f"){reason}"
         ),
         given=f"placed so far: {_listed(placed)}",
         allowed=(
             "dyads of two bodies with a joint between them, each with exactly one joint to a body already placed: "
             + "; ".join(f"{kind.words} ({kind.kind})" for kind in DYADS)
+            + "; wheels, each hinged to the body that carries both axes, in mesh with one already placed"
         ),
         remedy=remedy,
     )
@@ -165,7 +173,7 @@ def _group(mechanism: Mechanism, placed: Sequence[str], left_over: Sequence[str]
     return ()
 
 
-def _idle_faults(driven: str, dyads: Sequence[Dyad]) -> list[Fault]:
+def _idle_faults(driven: str, dyads: Sequence[Group]) -> list[Fault]:
     """Dyads that hang on the frame alone: a truss, which the driver does not reach."""
     faults, moving = [], [driven]
     for dyad in dyads:
@@ -176,9 +184,9 @@ def _idle_faults(driven: str, dyads: Sequence[Dyad]) -> list[Fault]:
         faults.append(
             Fault(
                 key="mechanism.joints",
-                problem=f"the driver does not move {dyad.bodies[0]} and {dyad.bodies[1]}: 6 unknowns and 6 equations "
-                f"of the joints {joints} fix them to the frame",
-                given=f"they hang on {dyad.hosts[0]} and {dyad.hosts[1]}",
+                problem=f"the driver does not move {' and '.join(dyad.bodies)}: {3 * len(dyad.bodies)} unknowns and "
+                f"{3 * len(dyad.bodies)} equations of the joints {joints} fix them to the frame",
+                given=f"they hang on {' and '.join(dyad.hosts)}",
                 allowed="bodies that a chain of joints links to the driven body",
                 remedy=f"hang one of them on {driven} or on a body that it moves",
             )

@@ -64,6 +64,22 @@ class Guide:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh:
+    """Teeth of two wheels: a force of one unknown size.
+
+    Attributes
+    ----------
+    joint : the gear as a joint, at points on the axes
+    direction : of the force on its first body, of tangential part one
+    shifts : from these points to where the force acts, in the frame's axes [m]
+    """
+
+    joint: Joint
+    direction: Pair
+    shifts: tuple[Pair, Pair]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AppliedLoad:
     """A force [N] in the frame's axes on a point [m] in body axes, or a torque [N*m], that acts on a moving body.
 
@@ -109,6 +125,7 @@ class Balance:
     mechanism, poses : bodies and joints, and how the moving bodies move
     driver : the driver's joint; it comes last, as in Eq. (1)
     guides : prismatic joints by name
+    meshes : of gears
     loads : applied forces and torques
     moments : prismatic joints on the frame whose guide moment is wanted
     """
@@ -119,6 +136,7 @@ class Balance:
         poses: Mapping[str, Pose],
         driver: Joint,
         guides: Mapping[str, Guide],
+        meshes: Sequence[Mesh],
         loads: Sequence[AppliedLoad],
         moments: frozenset[str],
     ) -> None:
@@ -128,7 +146,8 @@ class Balance:
         self._loads = loads
         self._without_moment = [g.slider for name, g in guides.items() if g.fixed and name not in moments]
         ordered = [j for j in mechanism.joints if j is not driver] + [driver]
-        self.contacts = {joint.name: self._contact(joint) for joint in ordered}
+        self.contacts = {mesh.joint.name: self._teeth(mesh) for mesh in meshes}
+        self.contacts |= {joint.name: self._contact(joint) for joint in ordered}
         self._solved: list[JointAction] = []
 
     def _contact(self, joint: Joint) -> JointAction:
@@ -149,6 +168,12 @@ class Balance:
             points=(first, second),
             shifts=(scale(travel, guide.direction), ZERO),
         )
+
+    def _teeth(self, mesh: Mesh) -> JointAction:
+        joint, size = mesh.joint, sp.Symbol(f"gear.{mesh.joint.name}.tangential", real=True)
+        first, second = (self.point(joint, body) for body in joint.bodies)
+        along = ((size, mesh.direction),)
+        return JointAction(joint=joint, along=along, moment=None, points=(first, second), shifts=mesh.shifts)
 
     @property
     def unknowns(self) -> tuple[sp.Symbol, ...]:
@@ -270,7 +295,11 @@ class Balance:
         on_first = scale(contact.sign(body), force)
         for (symbol, _), axis, value in zip(contact.along, "xy", on_first, strict=True):
             ledger.define(symbol.name, value, "N", *_force_words(joint, axis))
-        self._solved.append(contact)
+        self.know(joint.name)
+
+    def know(self, name: str) -> None:
+        """Count the force of a joint or gear, which has been defined, as known."""
+        self._solved.append(self.contacts[name])
 
     def solve_hinge_by_forces(self, ledger: Ledger, joint: Joint, body: str) -> None:
         """Define a revolute joint's unknowns by the balance of forces on a body."""

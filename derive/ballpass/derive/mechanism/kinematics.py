@@ -101,12 +101,14 @@ class Turn:
     cos, sin : of the angle of the body's x axis from +x [1]
     rate : angular velocity, counter-clockwise [rad/s]; structurally zero for a slider on a fixed guide
     acceleration : angular acceleration [rad/s^2]
+    angle : with its whole turns, where it grows in proportion to the driver's [rad]; else None
     """
 
     cos: sp.Expr
     sin: sp.Expr
     rate: sp.Expr
     acceleration: sp.Expr
+    angle: sp.Expr | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +232,7 @@ def place(
         sin=turn.sin,
         rate=turn.rate,
         acceleration=turn.acceleration,
+        angle=turn.angle,
         anchor=anchor,
         anchor_motion=anchor_motion,
         origin=anchor_motion,
@@ -260,6 +263,7 @@ def frame_pose() -> Pose:
         sin=sp.S.Zero,
         rate=sp.S.Zero,
         acceleration=sp.S.Zero,
+        angle=sp.S.Zero,
         anchor=ZERO,
         anchor_motion=AT_REST,
         origin=AT_REST,

@@ -6,6 +6,7 @@ in the scene (law 1).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -14,7 +15,8 @@ import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.assembly import assemble
-from ballpass.derive.mechanism.dyads import Dyad, Margin, Placement
+from ballpass.derive.mechanism.dyads import Group, Margin, Placement
+from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
@@ -87,9 +89,21 @@ class Linkage:
         return tuple(sp.ordered(found))
 
     @property
-    def dyads(self) -> tuple[Dyad, ...]:
-        """In the order of assembly."""
+    def dyads(self) -> tuple[Group, ...]:
+        """And wheels in mesh, in the order of assembly."""
         return tuple(p.dyad for p in self.placements)
+
+    @property
+    def contacts(self) -> tuple[Joint, ...]:
+        """Joints, and gears as joints."""
+        return (*self.mechanism.joints, *(d.mesh for d in self.dyads if isinstance(d, GearPair)))
+
+    @property
+    def turns(self) -> int:
+        """Turns of the driver after which all bodies are where they were."""
+        angles = (pose.angle for pose in self.poses.values())
+        ratios = (sp.diff(angle, self.drive.angle) for angle in angles if angle is not None)
+        return math.lcm(*(sp.Rational(ratio).q for ratio in ratios))
 
     @property
     def margins(self) -> tuple[Margin, ...]:
@@ -165,13 +179,14 @@ def check_assembly(
     """
     driven = linkage.poses[linkage.driven]
     numbers = {**values, **{str(symbol): 0.0 for symbol in linkage.positions}}
-    faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers)
+    turns = linkage.turns
+    faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, turns=turns)
     if not faults and linkage.play:
         plays = {
             joint: (tuple(sorted((s for e in motion.position for s in e.free_symbols), key=str)), reach[joint])
             for joint, motion in linkage.play.items()
         }
-        faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, plays)
+        faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, plays, turns)
     if faults:
         raise LinkageError(faults)
 
@@ -197,7 +212,7 @@ def _place_driven(
     )
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
-    turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration)
+    turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration, angle=drive.angle)
     return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot, slope)
 
 

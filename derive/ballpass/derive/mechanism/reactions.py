@@ -17,6 +17,7 @@ from types import MappingProxyType
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance, Guide
+from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.mechanism.kinematics import Ledger, Pair, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.errors import Fault, LinkageError
@@ -32,7 +33,7 @@ class Reactions:
     matrix, unknowns, right_side : A (n × n), r (n), b (n) of A r = b; the driver's joint and torque come last
     rows : body and balance (``x``, ``y``, ``moment``) of each equation
     definitions : the solution, ordered; the unknowns are among the symbols
-    joint_force : by joint, force [N] of ``bodies[1]`` on ``bodies[0]``
+    joint_force : by joint or gear, force [N] of ``bodies[1]`` on ``bodies[0]``
     joint_moment : by prismatic joint, moment [N*m] of ``bodies[1]`` on ``bodies[0]`` with the force at ``points[1]``; a
         joint whose moment was not asked for is none of them
     drive_torque : torque [N*m] of the drive on the driven body, counter-clockwise
@@ -68,7 +69,8 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     guides = {guide.joint.name: guide for p in linkage.placements for guide in p.guides}
     _refuse(linkage, guides, moments)
     driver, driven = linkage.driver, linkage.driven
-    balance = Balance(mechanism, linkage.poses, driver, guides, loads, moments)
+    meshes = [p.dyad.meshing(p) for p in linkage.placements if isinstance(p.dyad, GearPair)]
+    balance = Balance(mechanism, linkage.poses, driver, guides, meshes, loads, moments)
     matrix, right_side, rows = balance.equations(driven)
     ledger = Ledger()
     for placement in reversed(linkage.placements):
@@ -77,7 +79,7 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     on_driven = tuple(balance.known_forces(driven))
     balance.solve_hinge_by_forces(ledger, driver, driven)
     ledger.define(DRIVE_TORQUE.name, torque, "N*m", f"torque of the drive on {driven}, counter-clockwise", "M_d")
-    forces = {joint.name: balance.force_symbols(ledger, joint) for joint in mechanism.joints}
+    forces = {joint.name: balance.force_symbols(ledger, joint) for joint in linkage.contacts}
     return Reactions(
         matrix=matrix,
         unknowns=balance.unknowns,

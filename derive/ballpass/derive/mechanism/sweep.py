@@ -32,8 +32,9 @@ def locked_positions(
     driven: Pose,
     values: Mapping[str, float],
     plays: Mapping[str, tuple[tuple[sp.Symbol, ...], float]] = MappingProxyType({}),
+    turns: int = 1,
 ) -> list[Fault]:
-    """One fault for each dyad that cannot be assembled somewhere in a turn.
+    """One fault for each dyad that cannot be assembled somewhere in the turns after which all bodies are alike.
 
     Every margin is swept over a turn in steps of `STEP`, and each of its minima is refined.
 
@@ -50,6 +51,7 @@ def locked_positions(
     KeyError
         a parameter without a value.
     """
+    assert driven.angle is not None  # it is the driver's
     evaluator = Evaluator(definitions, [p.margin.expression for p in placements], given=(driven.cos, driven.sin))
     parameters: dict[sp.Symbol, Any] = {sp.Symbol(name, real=True): np.float64(v) for name, v in values.items()}
 
@@ -57,7 +59,7 @@ def locked_positions(
         radians = np.deg2rad(degrees)
         # Beyond the limit of one dyad the next one is NaN: no warning, because this is what the sweep searches for.
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            turned = {**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians)}
+            turned = {**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians), driven.angle: radians}
 
             def margins(moved: Mapping[sp.Symbol, float]) -> Array:
                 rows = evaluator({**turned, **moved})
@@ -69,7 +71,7 @@ def locked_positions(
                 left = left - np.sqrt(sum(way**2 for way in ways))
         return left
 
-    grid = np.arange(0.0, 360.0, STEP)
+    grid = np.arange(0.0, 360.0 * turns, STEP)
     swept = sweep(grid)
     faults = []
     for row, placement in enumerate(placements):
@@ -79,7 +81,8 @@ def locked_positions(
         here = np.where(reachable, here, np.inf)
         angle, least = _least(sweep, row, grid, here)
         if least <= DEAD_CENTER:
-            faults.append(_fault(placement, angle, least, grid[here <= DEAD_CENTER], plays))
+            closed = STEP * float(np.count_nonzero(here <= DEAD_CENTER))
+            faults.append(_fault(placement, angle, least, (closed, 360.0 * turns), plays))
     return faults
 
 
@@ -98,22 +101,26 @@ def _least(sweep: Callable[[Array], Array], row: int, grid: Array, here: Array) 
             lowest = int(np.argmin(values))
             center, half = float(fine[lowest]), half / 10
             if values[lowest] < best[1]:
-                best = center % 360.0, float(values[lowest])
+                best = center % (grid[-1] + STEP), float(values[lowest])
     return best
 
 
-def _fault(placement: Placement, angle: float, least: float, closed: Array, plays: Iterable[str]) -> Fault:
+def _fault(
+    placement: Placement, angle: float, least: float, closed: tuple[float, float], plays: Iterable[str]
+) -> Fault:
+    """`closed` is how much of the crank's way the dyad is not assembled at, and the whole way [deg]."""
     margin, dyad = placement.margin, placement.dyad
     joints = ", ".join(dyad.joints)
     if np.isneginf(least):
         problem = f"the dyad at joint {margin.joint} has no finite position at {angle:.4g} deg: is a length zero?"
-        given = f"joints {joints} of {dyad.bodies[0]} and {dyad.bodies[1]}"
+        given = f"joints {joints} of {' and '.join(dyad.bodies)}"
     else:
         verb = "locks (dead centre)" if abs(least) <= DEAD_CENTER else "cannot be assembled"
         problem = f"the linkage {verb} at joint {margin.joint} at a crank angle of {angle:.4f} deg"
         given = f"{margin.description}: {least:.6g} there"
-        if closed.size > 1:
-            given += f", not positive at {closed.size * STEP:.4g} of the 360 deg of a turn"
+        if closed[0] > STEP:
+            whole = "a turn" if closed[1] == 360.0 else "the turns after which the machine repeats"
+            given += f", not positive at {closed[0]:.4g} of the {closed[1]:g} deg of {whole}"
     remedy = f"change the lengths between joints {joints}, or shorten the crank"
     if played := ", ".join(plays):
         problem = (

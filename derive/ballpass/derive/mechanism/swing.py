@@ -36,12 +36,12 @@ class Ideal(sp.Function):  # type: ignore[misc]
 
 
 class Turns(sp.Function):  # type: ignore[misc]
-    """``Turns(cos, sin, *positions)``: whole turns of a direction in a turn of the driver; infinite where it turns by
-    more than `FARTHEST` between neighbours."""
+    """``Turns(cos, sin, period, *positions)``: turns of a direction in a turn of the driver, whole ones in a `period`
+    of so many turns; infinite where it turns by more than `FARTHEST` between neighbours."""
 
 
 class Mean(sp.Function):  # type: ignore[misc]
-    """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns, rounded [rad]."""
+    """``Mean(cos, sin, turns, period, *positions)``: mean direction over a period, less the turns, rounded [rad]."""
 
 
 #: Functions of the linkage without play: constants of a run.
@@ -50,7 +50,7 @@ OF_IDEAL_LINKAGE = (Ideal, Turns, Mean)
 
 def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
     """The coordinates that are zero in a function of the ideal linkage."""
-    return tuple(function.args[3 if isinstance(function, Mean) else 2 :])
+    return tuple(function.args[{Ideal: 2, Turns: 3, Mean: 4}[function.func] :])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,9 +85,11 @@ def swing_of(linkage: Linkage, body: str) -> Swing:
     """Angle of a body of a linkage, or of its frame."""
     if body == linkage.driven:
         return with_driver(linkage.drive)
-    pose, positions = linkage.pose(body), linkage.positions
+    pose, positions, period = linkage.pose(body), linkage.positions, linkage.turns
     if sp.sympify(pose.cos).is_number:
         return STILL
+    if pose.angle is not None:  # in proportion to the driver's
+        return Swing(turns=sp.diff(pose.angle, linkage.drive.angle), rate=pose.rate)
     mark, start = subscript(body), linkage.drive.first_angle
     turns, mean, swing, at_start = (
         sp.Symbol(f"body.{body}.{name}", real=True) for name in ("turns", "mean_angle", "swing", "swing_at_start")
@@ -95,8 +97,20 @@ def swing_of(linkage: Linkage, body: str) -> Swing:
     known = turns * DRIVER_ANGLE + mean
     cos, sin = sp.cos(known), sp.sin(known)
     constants = (
-        (turns, Turns(pose.cos, pose.sin, *positions), "1", f"Turns of the {body} in a turn of the driver", "N"),
-        (mean, Mean(pose.cos, pose.sin, turns, *positions), "rad", f"Mean of the rest of the {body}'s angle", "m"),
+        (
+            turns,
+            Turns(pose.cos, pose.sin, period, *positions),
+            "1",
+            f"Turns of the {body} in a turn of the driver",
+            "N",
+        ),
+        (
+            mean,
+            Mean(pose.cos, pose.sin, turns, period, *positions),
+            "rad",
+            f"Mean of the rest of the {body}'s angle",
+            "m",
+        ),
         (at_start, Ideal(swing, start, *positions), "rad", f"Swing of the {body} at the start, ideal", "s^0"),
     )
     rest = mean + sp.atan2(pose.sin * cos - pose.cos * sin, pose.cos * cos + pose.sin * sin)

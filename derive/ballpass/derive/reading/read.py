@@ -15,6 +15,7 @@ import shlex
 import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -28,7 +29,7 @@ from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.values import parse_override, replaced, value_faults, with_values
 from ballpass.derive.scene.bearing_records import Bearing, InitialState
-from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.errors import Fault, LinkageError, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
 from ballpass.derive.scene.records import (
@@ -60,8 +61,8 @@ __all__ = ["parse_override", "read_scene", "scene_from_text", "with_values"]
 MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
 RESERVED = (
-    *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
-    *("reaction", "shaft", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
+    *("body", "driver", "force", "friction", "gate", "gear", "guide_friction", "input", "joint", "load", "phase"),
+    *("point", "reaction", "shaft", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
 #: Turns before the steady ones of a run whose length is not given, which it drops.
 DROPPED_CYCLES = 50.0
@@ -284,7 +285,7 @@ def _read(root: Table, name: str) -> Scene:
             named = [body.name for body in mechanism.bodies if body.positions and body.name != driven]
             _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
             _check_loads_beside(root, loads, bearings)
-        cycle = _turns_of_loads(mechanism, shaft, loads)
+        cycle = _turns_of_loads(mechanism, shaft, loads, None if root.collector.faults else mechanism)
         speeds = mechanism.driver.table if mechanism is not None else None
         # rows of equal speed are those of a constant one
         unlike = {q.value for q in (mechanism.driver.speed, *speeds.later_speed)} if mechanism and speeds else set()
@@ -319,10 +320,21 @@ def _states(root: Table, key: str) -> Iterator[bool]:
         yield isinstance(bearing, dict) and key in bearing
 
 
-def _turns_of_loads(mechanism: Mechanism | None, shaft: Shaft | None, loads: Sequence[Load]) -> int:
-    """Turns after which all loads repeat: means over other numbers of turns count some of these more than others."""
+def _turns_of_loads(
+    mechanism: Mechanism | None, shaft: Shaft | None, loads: Sequence[Load], geared: Mechanism | None
+) -> int:
+    """Turns after which all loads repeat: means over other numbers of turns count some of these more than others.
+
+    `geared` is a mechanism without faults, whose wheels repeat as well.
+    """
     laws = [force.law for force in mechanism.forces] if mechanism is not None else []
     counts = [law.turns for law in laws if isinstance(law, AngleTable)]
+    if geared is not None and geared.gears:
+        from ballpass.derive.drive import known_drive
+        from ballpass.derive.mechanism.linkage import derive_linkage  # importing SymPy takes longer than reading
+
+        with suppress(LinkageError):  # the derivation reports it
+            counts.append(derive_linkage(geared, known_drive(geared.driver)).turns)
     if shaft is not None and shaft.speed.value != 0.0:
         for law in (load.law for load in loads):
             ratio = (

@@ -26,6 +26,7 @@ from ballpass.derive.scene.records import (
     Body,
     Driver,
     Force,
+    Gear,
     Joint,
     Mechanism,
     NamedPoint,
@@ -70,7 +71,7 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
     revolute joint from the frame to a body; names; and what `Table` notes.
     """
     with table:
-        table.know("gravity", "driver", "frame", "bodies", "joints", *(kind.key for kind in FORCE_TABLES))
+        table.know("gravity", "driver", "frame", "bodies", "joints", "gears", *(kind.key for kind in FORCE_TABLES))
         gravity = GRAVITY.read(table, "gravity")
         driver = _read_driver(table)
         with table.table("frame", "its points") as frame:
@@ -81,9 +82,16 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
         points |= {body.name: [point.name for point in body.points] for body in bodies}
         joints, sound = _read_joints(table, points)
         driven = _check_driver(table, driver, joints, sound)
+        gears = _read_gears(table, points, joints)
         forces = _read_forces(table, points)
     mechanism = Mechanism(
-        gravity=gravity, driver=driver, frame_points=frame_points, bodies=bodies, joints=joints, forces=forces
+        gravity=gravity,
+        driver=driver,
+        frame_points=frame_points,
+        bodies=bodies,
+        joints=joints,
+        forces=forces,
+        gears=gears,
     )
     return mechanism, driven
 
@@ -199,6 +207,27 @@ def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
     good = check_two_bodies(data, joint.bodies, points, "a joint of a body with itself") and joint.kind is not None
     refuse_unknown_points(data, joint, points)
     return joint, good
+
+
+def _read_gears(table: Table, points: Points, joints: Sequence[Joint]) -> tuple[Gear, ...]:
+    gears = []
+    with table.table("gears", required=False) as listed:
+        for name in listed.names("gear"):
+            if any(joint.name == name for joint in joints):
+                listed.fault(name, "a joint has this name", given=show(name), remedy="rename one of the two")
+            with listed.table(name, "bodies and teeth") as data:
+                gear = read_record(Gear, data, {"NAME": name, "INDEX": upright(name)}, name=name)
+                check_two_bodies(data, gear.bodies, points, "a gear of a body with itself")
+                if gear.kind == "internal" and gear.teeth[0] == gear.teeth[1]:
+                    data.fault(
+                        "teeth",
+                        "wheels of an internal gear have unlike numbers of teeth: the ring has more",
+                        given=show(list(gear.teeth)),
+                        allowed="two different numbers",
+                        remedy="correct one of them",
+                    )
+            gears.append(gear)
+    return tuple(gears)
 
 
 def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound: list[str]) -> str | None:

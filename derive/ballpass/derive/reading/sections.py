@@ -89,6 +89,7 @@ def _mechanism() -> Iterator[Section]:
     yield Section(path=("mechanism", "bodies", "*", "points"), keys=points)
     yield Section(path=("mechanism", "bodies", "*", "positions"), keys={"*": records.POSITION.filled(NAME)})
     yield _of("mechanism.joints.*", records.Joint, branch=read_mechanism.BRANCH)
+    yield _of("mechanism.gears.*", records.Gear)
     for table in FORCE_TABLES:
         yield from _forces(table)
 

@@ -343,6 +343,22 @@ class WholeKey(Key):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WholePairKey(WholeKey):
+    """Two whole numbers within the same bounds."""
+
+    def schema(self) -> dict[str, Any]:
+        """A list of two."""
+        return {"type": "array", "items": WholeKey.schema(self), "minItems": 2, "maxItems": 2}
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """Both numbers."""
+        if not isinstance(given, list) or len(given) != 2:
+            self.refuse(table, name, "this is not a list of two whole numbers", given)
+            return self.lowest, self.lowest
+        return tuple(WholeKey.value(self, table, name, item) for item in given)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceKey(Key):
     """One of some words; with a fault the one that it is like, None where it is like none of them."""
 

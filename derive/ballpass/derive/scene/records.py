@@ -12,12 +12,22 @@ Frame: x right, y up, angles counter-clockwise from +x.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.keys import ChoiceKey, NamesKey, Needs, QuantityKey, TextKey, VectorKey, WholeKey
+from ballpass.derive.scene.keys import (
+    ChoiceKey,
+    NamesKey,
+    Needs,
+    QuantityKey,
+    TextKey,
+    VectorKey,
+    WholeKey,
+    WholePairKey,
+)
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
@@ -170,6 +180,64 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Gear:
+    """Two wheels in mesh, or two pulleys of a belt, whose axes one body carries.
+
+    Seen from that body, the first wheel turns by `first_angle` and something [rad] where the second turns by
+    `second_angle` and the ratio of the `teeth` times it.
+    The force of a gear is that of ``bodies[1]`` on ``bodies[0]``.
+    """
+
+    name: str
+    kind: Literal["external", "internal", "belt"] = ChoiceKey(
+        name="type",
+        words="How the wheels mesh",
+        choices=("external", "internal", "belt"),
+        default="external",
+        note="of an internal gear the wheel with more teeth is the ring; a belt does not slip, and one strand carries",
+    ).declared()
+    bodies: tuple[str, str] = NamesKey(
+        words="Its two wheels",
+        example='["crank", "wheel"]',
+        note='both hinged to one body, which carries the axes; `"frame"` may be one of them, or that body',
+    ).declared()
+    teeth: tuple[int, int] = WholePairKey(
+        words="Teeth of both wheels", example=[20, 40], lowest=1, highest=10000, note="their ratio alone counts"
+    ).declared()
+    pressure_angle: SceneNumber = quantity(
+        "rad",
+        "Pressure angle of gear NAME",
+        r"\alpha_{INDEX}",
+        "20 deg",
+        default="20 deg",
+        bounds=Bounds(least=0.0, below=math.pi / 4),
+        note="from the common tangent of the pitch circles to the line of pressure",
+    )
+    radius: SceneNumber | None = positive(
+        "m",
+        "Radius of the first pulley of gear NAME",
+        r"r_{INDEX}",
+        "40 mm",
+        needs=(Needs(key="type", value="belt", why="radii of wheels in mesh follow from the distance of their axes"),),
+    )
+    first_angle: SceneNumber = quantity(
+        "rad",
+        "Angle of the first wheel of gear NAME in one position",
+        r"\varphi_{1,INDEX}",
+        "0 deg",
+        default="0 deg",
+        note="in axes of the body that carries it; a wheel that swings stays within half a turn of it",
+    )
+    second_angle: SceneNumber = quantity(
+        "rad",
+        "Angle of the second wheel of gear NAME in that position",
+        r"\varphi_{2,INDEX}",
+        "0 deg",
+        default="0 deg",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedOverTime:
     """Rows of a driver's speed: times [s], increasing, and the speeds after the first, which is `Driver.speed`."""
 
@@ -250,6 +318,7 @@ class Mechanism:
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
     forces: tuple[Force, ...]
+    gears: tuple[Gear, ...] = ()
 
     def body(self, name: str) -> Body:
         """Moving body by name."""

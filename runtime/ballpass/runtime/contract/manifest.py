@@ -140,8 +140,8 @@ class TurningInfo:
 class InputInfo:
     """A quantity the driver holds constant between breakpoints.
 
-    kind ``phase``: the angle of `turning` at the reference time, within a turn [rad], ``angle``: the same with whole
-    turns, ``rate``: its rate there [rad/s], ``slope``: the slope of that [rad/s^2].
+    kind ``phase``: the angle of `turning` at the reference time, within `turns` turns [rad], ``angle``: the same with
+    all turns, ``rate``: its rate there [rad/s], ``slope``: the slope of that [rad/s^2].
     kind ``gate``: 1 while that angle, modulo a turn over `parts`, lies in one of `windows` (pairs of names), else 0.
     kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
     (names of parameters); kind ``table_rate``: its slope there.  With a `turning`, `times` are values of its angle
@@ -371,6 +371,7 @@ class MechanismInfo:
     angle: str = ""
     rate: str = ""
     driver: str = ""  # the joint that is turned
+    repeats: int = 1  # turns of the driver after which all bodies are where they were: gears
     turns: tuple[tuple[str, int], ...] = ()
     springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 

@@ -300,7 +300,7 @@ static dual input_at(const schedule_scene *scene, const schedule_input *input, c
     if (input->kind == SCHEDULE_ANGLE) return angle_of(&p, t);
     if (input->kind == SCHEDULE_PHASE) {
         const dual angle = angle_of(&p, t);
-        return (dual){modulo(angle.v, TURN), angle.d};
+        return (dual){modulo(angle.v, input->turns * TURN), angle.d};
     }
     const piece many = {p.begin, p.passed, times((dual){input->parts, 0.0}, p.angle), times((dual){input->parts, 0.0}, p.rate),
                         times((dual){input->parts, 0.0}, p.half), p.end};

@@ -36,7 +36,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     if mechanism is None or not mechanism.margins:
         return
     moves = timeline.is_free(model.manifest) or timeline.driver(model.manifest, numbers.values).fastest > 0.0
-    angles = TURN * np.arange(ANGLES) / ANGLES if moves else np.zeros(1)
+    angles = TURN * np.arange(ANGLES * mechanism.repeats) / ANGLES if moves else np.zeros(1)
     margins = _margins(model, numbers, angles)
     faults = []
     for row, info in enumerate(mechanism.margins):

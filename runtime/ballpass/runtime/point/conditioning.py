@@ -84,7 +84,8 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
         fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
         return np.array([kernel({**fixed, **{n: rows[k] for n, rows in at.items()}}) for k in range(len(angles))])
 
-    angles = TURN * np.arange(ANGLES) / ANGLES if moves else np.zeros(1)
+    turns = 1 if manifest.mechanism is None else manifest.mechanism.repeats
+    angles = TURN * np.arange(ANGLES * turns) / ANGLES if moves else np.zeros(1)
     sampled, found = matrices(angles), []
     for condition in (_condition, lambda m: _condition(equilibrate(m))):
         values = condition(sampled)

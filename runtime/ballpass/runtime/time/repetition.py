@@ -80,7 +80,7 @@ class Repetition:
     Attributes
     ----------
     driver : the angle of driver or shaft; where a torque drives, of its first speed
-    turns : of it, after which all loads over its angle repeat: two for a four-stroke engine
+    turns : of it, after which all bodies and all loads over its angle repeat: two for a four-stroke engine
     changes : spans of time in which tables over time change a value; one that jumps does so at once [s]
     rates : of turnings, by these; what stands is left out
     shaft, balls : driver or shaft, and balls that pass the outer rings of bearings
@@ -211,9 +211,11 @@ def alike_from_slope(manifest: Manifest, values: Values, moved: Mapping[str, flo
 
 def _tables(manifest: Manifest, values: Values) -> list[tuple[str, int]]:
     """Of each table over an angle: its turning, and the turns after which it repeats."""
-    if manifest.mechanism is not None and timeline.is_free(manifest):  # its tables are no inputs
-        return list(manifest.mechanism.turns)
-    return [(item.turning, _turns_of(item, values)) for item in manifest.inputs if item.kind == "table"]
+    mechanism = manifest.mechanism
+    geared = [] if mechanism is None else [("driver", mechanism.repeats)]
+    if mechanism is not None and timeline.is_free(manifest):  # its tables are no inputs
+        return [*geared, *mechanism.turns]
+    return [*geared, *((item.turning, _turns_of(item, values)) for item in manifest.inputs if item.kind == "table")]
 
 
 def _turns_of(item: InputInfo, values: Values) -> int:

@@ -175,7 +175,7 @@ def turned(manifest: Manifest, values: Values, angles: np.ndarray) -> dict[str, 
         found["x"][:, at] = values[manifest.mechanism.start_angle] + angles
     for k, item in enumerate(manifest.inputs):
         if item.kind == "phase" and info_of(manifest, item).kind == "driver":
-            inputs[:, k] = (values[manifest.mechanism.start_angle] + angles) % TURN
+            inputs[:, k] = (values[manifest.mechanism.start_angle] + angles) % (item.turns * TURN)
     return found
 
 
@@ -235,7 +235,7 @@ def _input(
         return _table(item, values, t, inside, turning.get(item.turning))
     angle, rate, slope = turning[item.turning].held(t, inside)
     if item.kind == "phase":
-        reduced = np.mod(angle.real, TURN)
+        reduced = np.mod(angle.real, item.turns * TURN)
         return np.asarray(reduced + 1j * angle.imag if np.iscomplexobj(angle) else reduced)
     return np.asarray({"angle": angle, "rate": rate, "slope": slope}[item.kind])
 

@@ -51,7 +51,41 @@ class Margin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Dyad(ABC):
+class Group(ABC):
+    """Bodies that are placed together: a dyad, or a wheel in mesh.
+
+    Attributes
+    ----------
+    bodies, hosts : what is placed, and the bodies already placed that carry or turn them
+    """
+
+    bodies: tuple[str, ...]
+    hosts: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that the bodies are placed by."""
+
+    @abstractmethod
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
+        """Place the bodies on those in `poses`, writing the definitions into `ledger`.
+
+        Where a joint has `play`, each body has a point of its own there.
+
+        Raises
+        ------
+        LinkageError
+            a body whose two joints of a dyad sit on one and the same point; play that moves an axis of a gear.
+        """
+
+    @abstractmethod
+    def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
+        """Define the reactions of the group's joints; those of later groups are known to `balance`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dyad(Group):
     """Two bodies with a joint between them, each with one joint to a body already placed.
 
     Attributes
@@ -112,26 +146,10 @@ class Dyad(ABC):
     def branch_meaning(self) -> str:
         """The choice between the branches, as "on which side of ... the joint lies"."""
 
-    @abstractmethod
-    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
-        """Place the two bodies on the bodies in `poses`, writing the definitions into `ledger`.
-
-        Where a joint has `play`, each body has a point of its own there.
-
-        Raises
-        ------
-        LinkageError
-            a body whose two joints of the dyad sit on one and the same point.
-        """
-
-    @abstractmethod
-    def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
-        """Define the reactions of the dyad's joints; those of later dyads are known to `balance`."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """A dyad once it is placed.
+    """A group once it is placed.
 
     Attributes
     ----------
@@ -143,8 +161,8 @@ class Placement:
     guides : of its prismatic joints
     """
 
-    dyad: Dyad
-    poses: tuple[Pose, Pose]
+    dyad: Group
+    poses: tuple[Pose, ...]
     spans: tuple[Pair, ...]
     determinant: sp.Expr
     margin: Margin

@@ -41,7 +41,8 @@ class TwoBodies(Pathway):
         def excess(free: sp.Expr) -> sp.Expr:
             from_free = (sp.cos(free), sp.sin(free))
             turned = (dot(first, second), cross(first, second))
-            sin, cos, closed = cross(from_free, turned), dot(from_free, turned), setting.linkage.positions
+            sin, cos, linkage = cross(from_free, turned), dot(from_free, turned), setting.linkage
+            closed = (linkage.turns, *linkage.positions)
             turns, mean = (sp.Symbol(f"{force.label}.{name}", real=True) for name in ("turns", "mean_excess"))
             swings = sp.Max(1 - sp.Abs(turns), 0)
             words = f"the bodies of {force.name} against each other"

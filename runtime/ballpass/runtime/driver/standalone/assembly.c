@@ -31,11 +31,15 @@ void refuse_unassembled(const double *values, double turn, ballpass_faults *faul
 {
     double inputs[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
     const int turns = isfinite(turn);
+    long angles = ANGLES;
+    for (int i = 0; i < scene_schedule.count; i++) /* gears repeat after several turns */
+        if (scene_schedule.inputs[i].kind == SCHEDULE_PHASE && angles < (long)ANGLES * scene_schedule.inputs[i].turns)
+            angles = (long)ANGLES * scene_schedule.inputs[i].turns;
     schedule_inputs(&scene_schedule, values, 0.0, 0.0, inputs);
     for (int row = 0; row < SCENE_MARGINS; row++) {
         double worst = margin_at(values, inputs, row, 0.0), when = 0.0, reach = turn / ANGLES;
-        for (int k = 1; turns && k < ANGLES; k++) {
-            const double time = turn * k / ANGLES;
+        for (long k = 1; turns && k < angles; k++) {
+            const double time = turn * (double)k / ANGLES;
             keep_smaller(margin_at(values, inputs, row, time), time, &worst, &when);
         }
         for (int sweep = 0; turns && worst > 0.0 && sweep < SWEEPS; sweep++) {
