@@ -140,13 +140,13 @@ def test_runs_with_a_bearing_agree(where: tuple[str, str], model_of: Callable[..
     machine = geared_five_bar().with_values(mechanism__driver__start_angle=6.8)  # in the second turn
     model = model_of(linkage_text(machine) + bearing(*where, law='law = "none"') + RUN)
     run = {"cycles": 0.05, "transient": 0}
-    single = model.simulate(**run, method="stepper", rtol=1e-9)
-    other = model.simulate(**run, method="cvodes", rtol=1e-10)
+    single = model.simulate(**run, method="stepper", rtol=1e-10)
+    other = model.simulate(**run, method="cvodes", rtol=1e-11)
     for name in (*single.states, "drive_torque", "gear.G.force"):
         assert np.median(np.abs(single[name] - other[name])) <= 1e-5 * np.max(np.abs(single[name])) + 1e-12, name
     folder = export_c(model.folder, tmp_path / "c")
     subprocess.run(["make", "-s", "-C", str(folder)], check=True, timeout=300)
-    arguments = [str(folder / "scene"), "--cycles", "0.05", "--rtol", "1e-9"]
+    arguments = [str(folder / "scene"), "--cycles", "0.05", "--rtol", "1e-10"]
     printed = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=300).stdout
     columns = np.loadtxt(io.StringIO(printed), delimiter=",", skiprows=1, ndmin=2)
     assert np.array_equal(columns[:, 1 : 1 + len(model.states)], single.x)

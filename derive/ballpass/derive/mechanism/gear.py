@@ -83,8 +83,13 @@ class GearPair(Group):
         if self.gear.radius is not None:
             radius = symbol_of(self.gear.radius)
             return radius, radius * sp.Rational(second, first)
-        lever = sp.Rational(first, first - self.sense * second)
-        return lever * self.length, (lever - 1) * self.length
+        return self.lever * self.length, (self.lever - 1) * self.length
+
+    @property
+    def lever(self) -> sp.Rational:
+        """From the first axis to the pitch point, over the way to the second axis."""
+        first, second = self.gear.teeth
+        return sp.Rational(first, first - self.sense * second)
 
     def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Angle by the ratio, seen from the carrier; the axis as its hinge has it."""

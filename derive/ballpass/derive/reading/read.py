@@ -207,7 +207,7 @@ def _scene(
     faults = faults or duty_faults(scene)
     if not faults:
         return replace(scene, lines=collector.lines, notes=tuple(notes))
-    topology, none = ("mechanism.joints", "mechanism.driver"), ("mechanism", "mechanism.bodies")
+    topology, none = ("mechanism.joints", "mechanism.gears", "mechanism.driver"), ("mechanism", "mechanism.bodies")
     places = [fault.key for fault in collector.faults]
     if scene.mechanism is not None and not any(key.startswith(topology) or key in none for key in places):
         # faults that the derivation would find next are reported with the rest

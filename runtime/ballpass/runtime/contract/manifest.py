@@ -372,6 +372,7 @@ class MechanismInfo:
     rate: str = ""
     driver: str = ""  # the joint that is turned
     repeats: int = 1  # turns of the driver after which all bodies are where they were: gears
+    wheels: tuple[tuple[str, str, str, str, float], ...] = ()  # bodies in mesh, on axes; share of the first
     turns: tuple[tuple[str, int], ...] = ()
     springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 

@@ -189,6 +189,7 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             if kind == "revolute"
         ],
         "guides": guides,
+        "wheels": [[shown.index((b, p)), shown.index((c, q)), share] for b, p, c, q, share in mechanism.wheels],
         "springs": [[shown.index((b, p)), shown.index((c, q))] for _, b, p, c, q in mechanism.springs],
         "driver": next(
             shown.index((body, point)) for name, *_, body, point in mechanism.joints if name == mechanism.driver

@@ -138,6 +138,11 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
             direction = guide_direction(now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
             words.avoid(now[second, block] - 0.1 * size * direction, now[second, block] + 0.1 * size * direction, 0.1)
+    for *ends, share in mechanism.wheels:  # pitch circles
+        one, other = now[ends[0], ends[1]], now[ends[2], ends[3]]
+        for at, part in ((one, share), (other, 1.0 - share)):
+            radius = abs(part) * float(np.hypot(*(other - one)))
+            axes.add_patch(Circle(tuple(at), radius, fill=False, edgecolor=GREY, linewidth=1.2, zorder=1.5))
     for _, *ends in mechanism.springs:
         one, other = (now[ends[k], ends[k + 1]] for k in (0, 2))
         _draw_spring(axes, one, other, size)

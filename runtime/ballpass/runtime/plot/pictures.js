@@ -124,6 +124,15 @@ function drawLinkage(parts) {
     draw(picture, "line", { x1: x - 5, x2: x + 5, y1: y + 4.5, y2: y + 4.5, ...ink });
     moves.push(() => avoid([x, y], [x, y + 5], 0.1));
   }
+  for (const [one, other, share] of parts.wheels) {
+    for (const [centre, part] of [[one, share], [other, 1 - share]]) {
+      const node = draw(picture, "circle", { fill: "none", stroke: "var(--soft)", "stroke-width": 0.4 });
+      moves.push((k) => {
+        const [[cx, cy], a, b] = [place(centre, k), place(one, k), place(other, k)];
+        set(node, { cx, cy, r: Math.abs(part) * length([b[0] - a[0], b[1] - a[1]]) });
+      });
+    }
+  }
   for (const [one, other] of parts.springs) {
     const node = draw(picture, "polyline", { fill: "none", stroke: "var(--soft)", "stroke-width": 0.6, "stroke-linejoin": "round" });
     moves.push((k) => {
