@@ -278,11 +278,12 @@ def _read(root: Table, name: str) -> Scene:
         tilts = _tilts(root, shaft, mechanism, driven)
         bearings = _read_bearings(root, mechanism, driven, tilts) if has_bearing else ()
         _check_positions(root, bearings, tilts)
+        known = driven is not None  # else a fault of the driver is noted
         if not any(bearing.position for bearing in bearings):
             driven = None
             _refuse_places(root, [load.path for load in loads if load.position is not None])
         if mechanism is not None:
-            named = [body.name for body in mechanism.bodies if body.positions and body.name != driven]
+            named = [body.name for body in mechanism.bodies if known and body.positions and body.name != driven]
             _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
             _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads, None if root.collector.faults else mechanism)
