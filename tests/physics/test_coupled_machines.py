@@ -220,26 +220,6 @@ def test_a_run_up_loads_one_way_bearings_with_the_reaction_of_the_accelerated_li
     assert len(set(loads)) == 4
 
 
-@pytest.mark.parametrize("ground", [150.0, pytest.param(50.0, marks=pytest.mark.long)])
-@pytest.mark.parametrize(("left", "refused"), [(0.009, True), (0.011, False)])
-def test_play_that_lets_a_linkage_reach_a_dead_centre_is_refused(ground: float, left: float, refused: bool) -> None:
-    """Coupler 100 mm and rocker 80 mm in one line with the crank of 30 mm, but for what is left.
-
-    In two joints the rings have 5 um each.
-    """
-    short = ground - math.copysign(left, ground - 100.0)
-    scene = with_bearings(
-        text("four_bar", ('D = ["120 mm", "0 mm"]', f'D = ["{short} mm", "0 mm"]')),
-        bearing("B", "crank"),
-        bearing("C", "rocker"),
-    )
-    if not refused:
-        derive(scene)
-        return
-    with pytest.raises(SceneError, match=r"(?s)bearings at B, C lets the linkage reach a dead centre.*less clear"):
-        derive(scene)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["press, bearings in all hinges", pytest.param("drag link", marks=pytest.mark.long), "Whitworth"]

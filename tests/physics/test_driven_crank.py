@@ -15,7 +15,7 @@ import sympy as sp
 from scipy.integrate import quad, simpson
 
 from ballpass.derive import derive, generate, read_scene
-from ballpass.derive.mechanism.sweep import Evaluator
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import IntegrationError, Model, Solution, load

@@ -8,7 +8,6 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -148,7 +147,7 @@ def derive(scene: Scene) -> System:
     Raises
     ------
     SceneError
-        Where the linkage's topology is wrong, its numbers lock it within a turn, or an output is unknown: all faults
+        Where the linkage's topology is wrong, it cannot be assembled at its start, or an output is unknown: all faults
         that can be reported together, with their lines; `LinkageError` where all are of the linkage.
 
     Examples
@@ -330,21 +329,18 @@ def _linked(
     """The linkage and its loads; None, with the faults noted."""
     linkage, forces = None, None
     play: dict[str, Motion] = {}
-    reach: dict[str, float] = {}
     for bearing in scene.bearings:
         if bearing.coupling == "two-way":
             joint = mechanism.joint(bearing.joint or "")
             inner = axis.reference if axis is not None and bearing.tilts else ring(ring_coordinates(bearing), 0)
             play[joint.name] = play_of(bearing, joint, inner)
-            # of several side by side the least play is all that the joint has
-            reach[joint.name] = min(max(bearing.clearance.value, 0.0) / 2.0, reach.get(joint.name, math.inf))
     with _noted(errors):
         slope = axis.slope if axis is not None and scene.coupled else None
         linkage = derive_linkage(mechanism, drive, play, slope)
         with _noted(errors):
             forces = derive_forces(linkage)
         with _noted(errors):
-            check_assembly(linkage, {q.path: q.value for q in scene.quantities}, reach)
+            check_assembly(linkage, {q.path: q.value for q in scene.quantities})
         if forces is None:
             derive_reactions(linkage, (), _moments(scene))  # for its faults
     return None if linkage is None or forces is None else (linkage, forces)

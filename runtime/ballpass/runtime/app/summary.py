@@ -293,7 +293,7 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
     """Condition numbers of Eq. (1) over a turn; warns where they pass a bound."""
     if not has_reactions(model):
         return {}
-    found = conditioning(model, model.numbers(sol.parameters))
+    found = conditioning(model, model.numbers(sol.parameters), float(sol.t[-1]))
     angles = {"unscaled": found.unscaled_angle, "scaled": found.scaled_angle, "unit": "rad"}
     conditions = {"unscaled": found.unscaled, "scaled": found.scaled, "unit": "1", "crank_angle": angles}
     return {"reaction_condition": conditions}

@@ -13,11 +13,11 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
 from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.point.slopes import jacobian
+from ballpass.runtime.request.assembly import check_assembly
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.breakpoints import breakpoints
 

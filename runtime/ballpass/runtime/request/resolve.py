@@ -14,6 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.request.assembly import check_assembly
 from ballpass.runtime.request.choose_method import choose_method
 from ballpass.runtime.request.locating import Kinks, choose_kinks
 from ballpass.runtime.request.magnitudes import model_scales, stepper_magnitudes
@@ -128,6 +129,7 @@ def resolve(
     settings = model.manifest.run
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)
     span = asked_span(model, numbers, request) if span is None else span
+    check_assembly(model, numbers, span.end)
     initial = start_state(model, numbers, request.initial)
     stretch = timeline.stretch(model.manifest, numbers.values)
     looked_at = min(span.duration, SCALED_TURNS * stretch)

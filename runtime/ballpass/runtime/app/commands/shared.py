@@ -334,7 +334,7 @@ def load_model(
 
     Parameters
     ----------
-    asked : of the scene; numbers of ``--set`` are refused where the linkage locks with them
+    asked : of the scene
     needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
         derived; empty for others.  A scene without states needs no stepper
     inspect : see `read_own`: refuses names that the model does not have
@@ -352,8 +352,6 @@ def load_model(
         return load_own(folder) if own else load(folder)
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
-    if any(path.startswith("mechanism.") for path in asked.overrides):
-        model.check_assembly(asked.overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol

@@ -1,0 +1,253 @@
+"""Check whether a linkage can be assembled: at the angles of the driver that a run reaches, and at one instant.
+
+Where a margin sinks below zero the linkage **locks**: beyond, it cannot be assembled.  Where a margin touches zero and
+rises again the linkage **branches**: the two positions of the dyad meet, and which of them it goes on with is open.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.time import timeline
+from ballpass.runtime.time.turning import TURN
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract.manifest import MarginInfo, MechanismInfo
+    from ballpass.runtime.contract.parameters import Numbers
+
+#: Margins up to this are no position of the linkage: the transmission angle is below 3e-5 rad, and forces grow like its
+#: inverse [1].
+DEAD_CENTER = 1e-9
+
+#: Angles checked in a turn; minima below `NEAR`, and the least one, are refined by sweeps, each so many times finer
+#: than the one before.
+ANGLES, NEAR, SWEEPS, FINE = 720, 1e-2, 3, 128
+
+#: Halvings of the interval in which a margin falls to `DEAD_CENTER`.
+HALVINGS = 45
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Position:
+    """A position of the driver beyond which the linkage is not valid.
+
+    Attributes
+    ----------
+    angle : up to which it is valid, past the start angle, negative where it lies before that [rad]
+    place : of the dyad's position where its margin is least [rad]
+    margin : the least one there [1]
+    info : of the dyad
+    branches : whether the dyad can be assembled on both sides; else it locks
+    """
+
+    angle: float
+    place: float
+    margin: float
+    info: MarginInfo
+    branches: bool
+
+    def words(self, start: float) -> str:
+        """A sentence; `start` is the driver's angle at t = 0 [rad]."""
+        does = "branches" if self.branches else "cannot be assembled"
+        place = math.degrees(start + self.place)
+        return (
+            f"The linkage {does} at joint {self.info.joint!r} at crank angle {place:.2f} deg "
+            f"({self.info.description}: margin {self.margin:.4g})."
+        )
+
+
+def valid_angles(model: LoadedModel, numbers: Numbers) -> tuple[Position, Position] | None:
+    """Where the range of the driver ends in which the linkage is valid, before and after its start; None: nowhere.
+
+    Raises
+    ------
+    RequestError
+        It cannot be assembled at the start.
+    """
+    mechanism = model.manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return None
+    key = numbers.p.tobytes()
+    known: tuple[bytes, tuple[Position, Position] | None] | None = model.valid_angles
+    if known is None or known[0] != key:
+        known = model.valid_angles = key, _valid_angles(model, numbers, mechanism)
+    return known[1]
+
+
+def _valid_angles(
+    model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo
+) -> tuple[Position, Position] | None:
+    infos = mechanism.margins
+
+    def margins(angles: np.ndarray) -> np.ndarray:
+        return _margins(model, numbers, angles)
+
+    angles = TURN * np.arange(ANGLES) / ANGLES
+    rows = margins(angles)
+    least = rows.min(axis=0)
+    minima = (rows <= np.roll(rows, 1, axis=0)) & (rows <= np.roll(rows, -1, axis=0))
+    minima &= (rows > DEAD_CENTER) & ((rows < NEAR) | (rows == least))
+    finer = [_lowest(margins, int(row), float(angles[k])) for k, row in np.argwhere(minima)]
+    if least.min() > DEAD_CENTER and all(margins(np.array([a]))[0].min() > DEAD_CENTER for a in finer):
+        return None
+    # a minimum between the last angle and the first lies before the start
+    places = np.unique(np.concatenate([angles, np.mod(finer, TURN)]))
+    rows = margins(places)
+    bad = np.flatnonzero(rows.min(axis=1) <= DEAD_CENTER)
+    start = math.degrees(timeline.start_angle(model.manifest, numbers.values))
+    if bad[0] == 0:
+        row = int(np.argmax(rows[0] <= DEAD_CENTER))
+        raise RequestError(
+            f"The linkage cannot be assembled at joint {infos[row].joint!r} at crank angle {start:.2f} deg, where it "
+            f"starts ({infos[row].description}: margin {rows[0, row]:.4g}). Change the lengths of the bodies that meet at "
+            f"the joint, or {mechanism.start_angle}."
+        )
+    places, rows = np.append(places, TURN), np.concatenate([rows, rows[:1]])
+    found = []
+    for k, sense in ((int(bad[-1]), -1), (int(bad[0]), 1)):  # from the start against the driver, and with it
+        row = int(np.argmax(rows[k] <= DEAD_CENTER))
+        last = k
+        while rows[last, row] <= DEAD_CENTER:
+            last += sense
+        closed = slice(min(k, last), max(k, last) + 1)
+        lowest = closed.start + int(np.argmin(rows[closed, row]))
+        inside, outside = float(places[k - sense]), float(places[k])
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + outside)
+            valid = bool(margins(np.array([middle]))[0].min() > DEAD_CENTER)
+            inside, outside = (middle, outside) if valid else (inside, middle)
+        found.append(
+            Position(
+                angle=inside if sense > 0 else inside - TURN,
+                place=float(places[lowest]) - (0.0 if sense > 0 else TURN),
+                margin=float(rows[lowest, row]),
+                info=infos[row],
+                branches=bool(rows[lowest, row] > -DEAD_CENTER),
+            )
+        )
+    return found[0], found[1]
+
+
+def _lowest(margins: Callable[[np.ndarray], np.ndarray], row: int, angle: float) -> float:
+    """The angle at which a margin is least, near a minimum of the sweep [rad]."""
+    reach = TURN / ANGLES
+    for _ in range(SWEEPS):
+        angles = angle + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+        angle, reach = float(angles[np.argmin(margins(angles)[:, row])]), reach / FINE
+    return angle
+
+
+def check_assembly(model: LoadedModel, numbers: Numbers, end: float = math.inf) -> None:
+    """Check that the linkage is valid at every angle that the driver reaches up to a time.
+
+    A driver that a torque turns may reach any angle where nothing holds it: it stops where the linkage locks, and is
+    refused where it branches.
+
+    Parameters
+    ----------
+    end : of the time from t = 0 on; infinite for a whole turn [s]
+
+    Raises
+    ------
+    RequestError
+        It is not: names the joint, its crank angle, and the angles for which the linkage is valid.  A body with a
+        bearing turns too fast for its angle to be followed.
+    """
+    manifest = model.manifest
+    ends = valid_angles(model, numbers)
+    if ends is not None:
+        start = timeline.start_angle(manifest, numbers.values)
+        low, high = _reached(model, numbers, end)
+        stops = timeline.is_free(manifest) and math.isfinite(end)
+        beyond = zip(ends, (low <= ends[0].angle, high >= ends[1].angle), strict=True)
+        if refused := [one for one, reached in beyond if reached and (one.branches or not stops)]:
+            first, last = (math.degrees(start + one.angle) for one in ends)
+            turns = " The driver cannot make a whole turn." if high - low >= TURN else ""
+            raise RequestError(
+                "\n".join(dict.fromkeys(one.words(start) for one in refused))
+                + f"\nIt is valid from {first:.4f} to {last:.4f} deg.{turns} Change the lengths of the bodies that "
+                "meet at the joint, or ask for a time in which the driver stays between these angles."
+            )
+    for constant in manifest.constants:
+        if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
+            what = constant.name.removeprefix("body.").removesuffix(".turns")
+            if ends is not None:
+                raise RequestError(
+                    f"The {what} carries a bearing, whose balls are followed over whole turns of the driver, and the "
+                    f"driver cannot make one: {ends[1].words(start)} Change the lengths of the bodies that meet there, "
+                    "or drive by mechanism.driver.swing."
+                )
+            raise RequestError(
+                f"The angle of {what} changes by more than three eighths of a turn while the driver turns by 7.5 "
+                "degrees: which way round is unknown. Change lengths so that no joint passes another so near."
+            )
+
+
+def _reached(model: LoadedModel, numbers: Numbers, end: float) -> tuple[float, float]:
+    """Least and largest angle of the driver up to a time, past its start [rad]; where a torque drives, any."""
+    if timeline.is_free(model.manifest) or math.isinf(end):
+        return -TURN, TURN
+    turning = timeline.driver(model.manifest, numbers.values)
+    low, high = turning.swept(0.0, end)
+    first = float(turning.at(0.0)[0])
+    return low - first, high - first
+
+
+def angles_reached(model: LoadedModel, numbers: Numbers, end: float) -> tuple[float, float]:
+    """The same, within a turn, and where a torque drives within the angles for which the linkage is valid [rad]."""
+    low, high = _reached(model, numbers, end)
+    ends = valid_angles(model, numbers) if timeline.is_free(model.manifest) else None
+    if ends is not None:
+        return ends[0].angle, ends[1].angle
+    return (low, high) if high - low < TURN else (0.0, TURN)
+
+
+def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mapping[str, Any]) -> None:
+    """Check every margin of the linkage at one instant alone, not over the turn.
+
+    Parameters
+    ----------
+    t : the instant [s]
+    there : arguments of generated functions at it, by name: t, u, p, c
+
+    Raises
+    ------
+    RequestError
+        A dyad cannot be assembled there; names its joint and the crank angle.
+    """
+    mechanism = model.manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return
+    kernel = model.kernel("assembly")
+    kernel.run(there)
+    (margins,) = kernel.outputs.values()
+    heights = margins.tolist()
+    if all(height > 0.0 for height in heights):  # NaN: it cannot be assembled
+        return
+    angle = math.degrees(timeline.crank_angle(model.manifest, numbers.values, t))
+    faults = [
+        f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
+        f"({info.description}: margin {height:.4g})."
+        for info, height in zip(mechanism.margins, heights, strict=True)
+        if not height > 0.0
+    ]
+    raise RequestError(
+        "\n".join(faults)
+        + "\nChange the lengths of the bodies that meet at the joint, or ask at an angle at which they "
+        "reach each other."
+    )
+
+
+def _margins(model: LoadedModel, numbers: Numbers, angles: np.ndarray) -> np.ndarray:
+    """Margins at angles past the start [rad], shape (angles, margins); NaN: it cannot be assembled."""
+    at = timeline.turned(model.manifest, numbers.values, angles)
+    arguments = {"t": 0.0, "p": numbers.p, "c": numbers.c}
+    (found,) = model.loop("assembly", tuple(at))(len(angles), {**at, **arguments}).values()
+    return np.where(np.isnan(found), -np.inf, found)
