@@ -27,8 +27,7 @@ from quick_cases import long_but
 from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.optimize import root
 
-from ballpass.derive import derive, generate
-from ballpass.derive.scene.errors import SceneError
+from ballpass.derive import generate
 from ballpass.runtime import Model, load, read_manifest
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ballpass.runtime import Model, RequestError
+from ballpass.runtime import IntegrationError, Model, RequestError, Status
 
 #: The press with a rod [m] shorter than its crank: hinge B stands ``crank |cos(angle)|`` beside the slider's guide.
 ROD, CRANK = 5e-3, 6e-3
@@ -66,7 +66,7 @@ START = "mechanism.driver.start_angle"
 
 @pytest.fixture(scope="module")
 def four_bar(scene_text: Callable[..., str], model_of: Callable[..., Model]) -> Model:
-    text = scene_text("four_bar", ('outputs = [', 'outputs = ["drive_torque"] #'))
+    text = scene_text("four_bar", ("outputs = [", 'outputs = ["drive_torque"] #'))
     return model_of(text[: text.index("[bearing]")] + text[text.index("[run]") :], "four_bar")
 
 
@@ -118,3 +118,53 @@ def test_members_of_an_ensemble_are_refused_by_their_own_runs(four_bar: Model) -
     result = four_bar.simulate_many(starts, ["peak:drive_torque"], duration=duration, transient=0.0)
     assert [failure.member for failure in result.failures] == [2]
     assert "valid from -102.8396 to 102.8396 deg" in result.failures[0].message
+
+
+# A crank that a torque turns towards where its rod is across the guide: sin(angle) = rod over crank.
+BY_TORQUE = """
+[mechanism.driver]
+joint = "A"
+speed = "1 rad/s"
+start_angle = "45 deg"
+[mechanism.driver.torque]
+law = "constant"
+torque = "{torque} N*m"
+[mechanism.frame.points]
+A = "origin"
+[mechanism.bodies]
+crank = {{ mass = "1 kg", inertia = "1 kg*m^2", center_of_mass = "0 m", points = {{ A = "origin", B = "{crank} m" }} }}
+rod = {{ mass = "1 kg", inertia = "0.1 kg*m^2", center_of_mass = "0.5 m", points = {{ B = "origin", C = "1 m" }} }}
+slider = {{ mass = "1 kg", center_of_mass = "origin", points = {{ C = "origin" }} }}
+[mechanism.joints]
+A = {{ type = "revolute", bodies = ["frame", "crank"] }}
+B = {{ type = "revolute", bodies = ["crank", "rod"] }}
+C = {{ type = "revolute", bodies = ["rod", "slider"], branch = "ahead" }}
+D = {{ type = "prismatic", bodies = ["frame", "slider"], points = ["A", "C"], direction = "0 deg" }}
+[run]
+duration = "3 s"
+transient_cycles = 0
+outputs = ["driver.angle"]
+"""
+
+
+@pytest.mark.parametrize("method", ["stepper", "stepper-dp54", "stepper-rodas4"])
+def test_a_driver_that_a_torque_turns_stops_where_the_linkage_locks(
+    model_of: Callable[..., Model], method: str
+) -> None:
+    """Steps passed over that moment, behind which the driver turned back and the rod had jumped to its other side."""
+    model, edge = model_of(BY_TORQUE.format(torque=400, crank=1.2)), math.degrees(math.asin(1.0 / 1.2))
+    with pytest.raises(IntegrationError, match=rf"crank angle {edge:.2f}\d\d deg.*Joint 'C' locks") as stopped:
+        model.simulate(method=method, rtol=1e-6)
+    assert stopped.value.status is Status.LOCKED
+    kept = stopped.value.partial
+    assert kept.t[-1] <= stopped.value.time
+    assert np.all(np.diff(kept["driver.angle"]) > 0.0)
+    angles = {"mechanism.driver.torque.torque": [400.0, -10.0]}
+    many = model.simulate_many(angles, ["max:driver.angle"], duration=0.3, method=method, rtol=1e-6)
+    assert [(one.member, one.status) for one in many.failures] == [(0, "LOCKED")]
+
+
+def test_a_driver_that_a_torque_turns_is_refused_where_the_linkage_branches(model_of: Callable[..., Model]) -> None:
+    model = model_of(BY_TORQUE.format(torque=400, crank=1.0))
+    with pytest.raises(RequestError, match=r"branches at joint 'C' at crank angle 90\.00 deg"):
+        model.simulate()

@@ -248,8 +248,8 @@ def simulate_many(
     members = make_members(model, columns)
     skipped = model.run_settings.transient_cycles if transient is None else real(transient)
     span = _spans(model, members, cycles, duration, skipped)
-    check_assembled_members(model, members, span)
-    in_lanes = driver is not None and lanes and at_kinks != LOCATED
+    may_lock = check_assembled_members(model, members, span)
+    in_lanes = driver is not None and lanes and at_kinks != LOCATED and not may_lock
     by_steps = [item for item in chosen if is_reduced(model, item)]
     others = [item for item in chosen if not is_reduced(model, item)]
     reduced = {row for item in by_steps for row in needed_rows(item)}

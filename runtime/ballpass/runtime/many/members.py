@@ -216,11 +216,15 @@ class Spans:
     starts: np.ndarray
 
 
-def check_assembled_members(model: LoadedModel, members: Members, spans: Spans) -> None:
-    """Note members whose linkage is not valid in their runs; each distinct geometry is swept once."""
+def check_assembled_members(model: LoadedModel, members: Members, spans: Spans) -> bool:
+    """Note members whose linkage is not valid in their runs; each distinct geometry is swept once.
+
+    Returns whether a torque may turn some to where they lock: these do not run in lanes.
+    """
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
-        return
+        return False
+    locks = False
     function = model.symbolic("assembly")
     # a turn has every angle for any speed and start
     speed_and_start = (mechanism.speed, mechanism.start_angle)
@@ -239,5 +243,7 @@ def check_assembled_members(model: LoadedModel, members: Members, spans: Spans) 
                 check_assembly(model, numbers, float(spans.durations[member]))
                 if valid_angles(model, numbers) is None:
                     break
+                locks = locks or timeline.is_free(model.manifest)
             except RequestError as fault:
                 members.refused[member] = str(fault)
+    return locks

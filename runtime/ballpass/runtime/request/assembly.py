@@ -30,6 +30,9 @@ DEAD_CENTER = 1e-9
 #: than the one before.
 ANGLES, NEAR, SWEEPS, FINE = 720, 1e-2, 3, 128
 
+#: A run of a driver that a torque turns has come to where its linkage locks, where a margin is below this [1].
+LOCKED = 1e-6
+
 #: Halvings of the interval in which a margin falls to `DEAD_CENTER`.
 HALVINGS = 45
 
@@ -81,13 +84,11 @@ def valid_angles(model: LoadedModel, numbers: Numbers) -> tuple[Position, Positi
     return known[1]
 
 
-def _valid_angles(
-    model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo
-) -> tuple[Position, Position] | None:
+def _valid_angles(model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo) -> tuple[Position, Position] | None:
     infos = mechanism.margins
 
     def margins(angles: np.ndarray) -> np.ndarray:
-        return _margins(model, numbers, angles)
+        return margins_at(model, numbers, angles)
 
     angles = TURN * np.arange(ANGLES) / ANGLES
     rows = margins(angles)
@@ -106,8 +107,8 @@ def _valid_angles(
         row = int(np.argmax(rows[0] <= DEAD_CENTER))
         raise RequestError(
             f"The linkage cannot be assembled at joint {infos[row].joint!r} at crank angle {start:.2f} deg, where it "
-            f"starts ({infos[row].description}: margin {rows[0, row]:.4g}). Change the lengths of the bodies that meet at "
-            f"the joint, or {mechanism.start_angle}."
+            f"starts ({infos[row].description}: margin {rows[0, row]:.4g}). Change the lengths of the bodies that meet "
+            f"at the joint, or {mechanism.start_angle}."
         )
     places, rows = np.append(places, TURN), np.concatenate([rows, rows[:1]])
     found = []
@@ -133,6 +134,11 @@ def _valid_angles(
             )
         )
     return found[0], found[1]
+
+
+def may_lock(model: LoadedModel, numbers: Numbers) -> bool:
+    """Whether a torque may turn the driver to where the linkage locks."""
+    return timeline.is_free(model.manifest) and valid_angles(model, numbers) is not None
 
 
 def _lowest(margins: Callable[[np.ndarray], np.ndarray], row: int, angle: float) -> float:
@@ -245,7 +251,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     )
 
 
-def _margins(model: LoadedModel, numbers: Numbers, angles: np.ndarray) -> np.ndarray:
+def margins_at(model: LoadedModel, numbers: Numbers, angles: np.ndarray) -> np.ndarray:
     """Margins at angles past the start [rad], shape (angles, margins); NaN: it cannot be assembled."""
     at = timeline.turned(model.manifest, numbers.values, angles)
     arguments = {"t": 0.0, "p": numbers.p, "c": numbers.c}
