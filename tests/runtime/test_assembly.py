@@ -81,7 +81,7 @@ def test_a_linkage_that_locks_runs_up_to_where_it_does(four_bar: Model) -> None:
     edge, links = math.degrees(math.acos(-2.0 / 9.0)), {COUPLER: 0.065, ROCKER: 0.065}
     for speed in (60.0, -60.0):
         assert len(run_to(four_bar, edge - 0.01, links | {SPEED: speed}).t) > 1
-        words = rf"cannot be assembled at joint 'C' .*: margin -.*valid from -{edge:.4f} to {edge:.4f} deg"
+        words = rf"cannot be assembled at joint 'C' .*: margin -.*valid from crank angle -{edge:.4f} to {edge:.4f} deg"
         with pytest.raises(RequestError, match=f"(?s){words}"):
             run_to(four_bar, edge + 0.01, links | {SPEED: speed})
     with pytest.raises(RequestError, match=r"cannot make a whole turn"):
@@ -95,7 +95,7 @@ def test_a_parallelogram_branches_where_it_is_flat(four_bar: Model) -> None:
     bars = {COUPLER: 0.12, ROCKER: 0.03, START: math.pi / 2.0}
     assert len(run_to(four_bar, 89.9, bars).t) > 1
     near = math.degrees(math.asin(math.sqrt(1e-9)))
-    words = rf"branches at joint 'C' at crank angle 180\.00 deg .*valid from {near:.4f} to {180.0 - near:.4f} deg"
+    words = rf"branches at joint 'C' at crank angle 180\.00 deg .*from crank angle {near:.4f} to {180.0 - near:.4f} deg"
     with pytest.raises(RequestError, match=f"(?s){words}") as refused:
         run_to(four_bar, 90.1, bars)
     assert "cannot be assembled" not in str(refused.value)
@@ -117,7 +117,7 @@ def test_members_of_an_ensemble_are_refused_by_their_own_runs(four_bar: Model) -
     duration = math.radians(50.0) / four_bar.parameters[SPEED]
     result = four_bar.simulate_many(starts, ["peak:drive_torque"], duration=duration, transient=0.0)
     assert [failure.member for failure in result.failures] == [2]
-    assert "valid from -102.8396 to 102.8396 deg" in result.failures[0].message
+    assert "valid from crank angle -102.8396 to 102.8396 deg" in result.failures[0].message
 
 
 # A crank that a torque turns towards where its rod is across the guide: sin(angle) = rod over crank.

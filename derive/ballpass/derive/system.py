@@ -424,10 +424,11 @@ def _system(parts: _Parts, errors: list[SceneError]) -> System:
         ),
         initial=_initial(parts),
         constants=(
+            *drive.constants,
             *(c for swing in parts.swings for c in swing.constants),
             *(c for model in models for c in model.constants),
             *(c for motion in parts.motions for c in motion.constants),
-            *(*drive.constants, *forces.constants, *parts.own.constants),
+            *(*forces.constants, *parts.own.constants),
             *dict.fromkeys(c for o in named for c in o.constants),
         ),
         definitions=(

@@ -84,10 +84,12 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     mechanism, linkage = system.scene.mechanism, system.linkage
     if mechanism is None or linkage is None:
         return None
-    driven = linkage.drive.coordinate
+    drive = linkage.drive
+    driven = drive.coordinate
     return mf.MechanismInfo(
-        speed=mechanism.driver.speed.path,
-        start_angle=mechanism.driver.start_angle.path,
+        speed=drive.first_speed.name,
+        start_angle=drive.first_angle.name,
+        swing="" if mechanism.driver.swing is None else mechanism.driver.swing.path,
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
         points=tuple(info_of(mf.PointInfo, p) for p in linkage.points),
         margins=tuple(info_of(mf.MarginInfo, m) for m in linkage.margins),

@@ -194,19 +194,19 @@ def _place_driven(
     play: Play,
     slope: Motion | None,
 ) -> Pose:
-    mark = subscript(body)
-    cos, sin = name_turn(ledger, body, sp.cos(drive.angle), sp.sin(drive.angle), mark)
+    mark, (angle, rate, acceleration) = subscript(body), drive.driven
+    cos, sin = name_turn(ledger, body, sp.cos(angle), sp.sin(angle), mark)
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
     acceleration = ledger.define(
         f"body.{body}.angular_acceleration",
-        drive.acceleration,
+        acceleration,
         "rad/s^2",
         f"angular acceleration of {body}: {drive.description}",
         rf"\ddot{{\varphi}}_{{{mark}}}",
     )
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
-    turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration)
+    turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration)
     return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot, slope)
 
 

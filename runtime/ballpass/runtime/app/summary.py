@@ -274,7 +274,7 @@ def _drive_work(model: Model, sol: Solution) -> float | None:
     None where a torque drives, or the driver makes no whole turn.
     """
     mechanism, numbers = sol.manifest.mechanism, model.numbers(sol.parameters)
-    if mechanism is None or mechanism.angle:
+    if mechanism is None or mechanism.angle or mechanism.swing:
         return None
     run = run_of(model, numbers, sol)
     window = whole_cycles(run.span, Repetition.of(sol.manifest, numbers.values).turns)

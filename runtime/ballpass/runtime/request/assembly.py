@@ -19,7 +19,7 @@ from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract.manifest import MarginInfo, MechanismInfo
+    from ballpass.runtime.contract.manifest import Manifest, MarginInfo, MechanismInfo
     from ballpass.runtime.contract.parameters import Numbers
 
 #: Margins up to this are no position of the linkage: the transmission angle is below 3e-5 rad, and forces grow like its
@@ -32,6 +32,8 @@ ANGLES, NEAR, SWEEPS, FINE = 720, 1e-2, 3, 128
 
 #: A run of a driver that a torque turns has come to where its linkage locks, where a margin is below this [1].
 LOCKED = 1e-6
+
+CRANK_ANGLE = "crank angle"
 
 #: Halvings of the interval in which a margin falls to `DEAD_CENTER`.
 HALVINGS = 45
@@ -56,12 +58,12 @@ class Position:
     info: MarginInfo
     branches: bool
 
-    def words(self, start: float) -> str:
-        """A sentence; `start` is the driver's angle at t = 0 [rad]."""
+    def words(self, start: float, what: str) -> str:
+        """A sentence; `start` is the driver's angle at t = 0 [rad], `what` what that is called."""
         does = "branches" if self.branches else "cannot be assembled"
         place = math.degrees(start + self.place)
         return (
-            f"The linkage {does} at joint {self.info.joint!r} at crank angle {place:.2f} deg "
+            f"The linkage {does} at joint {self.info.joint!r} at {what} {place:.2f} deg "
             f"({self.info.description}: margin {self.margin:.4g})."
         )
 
@@ -136,6 +138,11 @@ def _valid_angles(model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo
     return found[0], found[1]
 
 
+def _angle_words(manifest: Manifest) -> str:
+    """What turns evenly: the driver, or the phase of its swing."""
+    return "phase of the swing" if manifest.mechanism is not None and manifest.mechanism.swing else CRANK_ANGLE
+
+
 def may_lock(model: LoadedModel, numbers: Numbers) -> bool:
     """Whether a torque may turn the driver to where the linkage locks."""
     return timeline.is_free(model.manifest) and valid_angles(model, numbers) is not None
@@ -168,30 +175,30 @@ def check_assembly(model: LoadedModel, numbers: Numbers, end: float = math.inf) 
     """
     manifest = model.manifest
     ends = valid_angles(model, numbers)
+    start, what = timeline.start_angle(manifest, numbers.values), _angle_words(manifest)
     if ends is not None:
-        start = timeline.start_angle(manifest, numbers.values)
         low, high = _reached(model, numbers, end)
         stops = timeline.is_free(manifest) and math.isfinite(end)
         beyond = zip(ends, (low <= ends[0].angle, high >= ends[1].angle), strict=True)
         if refused := [one for one, reached in beyond if reached and (one.branches or not stops)]:
             first, last = (math.degrees(start + one.angle) for one in ends)
-            turns = " The driver cannot make a whole turn." if high - low >= TURN else ""
+            turns = " The driver cannot make a whole turn." if high - low >= TURN and what == CRANK_ANGLE else ""
             raise RequestError(
-                "\n".join(dict.fromkeys(one.words(start) for one in refused))
-                + f"\nIt is valid from {first:.4f} to {last:.4f} deg.{turns} Change the lengths of the bodies that "
-                "meet at the joint, or ask for a time in which the driver stays between these angles."
+                "\n".join(dict.fromkeys(one.words(start, what) for one in refused))
+                + f"\nIt is valid from {what} {first:.4f} to {last:.4f} deg.{turns} Change the lengths of the bodies "
+                "that meet at the joint, or ask for a time in which the driver stays between these angles."
             )
     for constant in manifest.constants:
         if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
-            what = constant.name.removeprefix("body.").removesuffix(".turns")
+            body = constant.name.removeprefix("body.").removesuffix(".turns")
             if ends is not None:
                 raise RequestError(
-                    f"The {what} carries a bearing, whose balls are followed over whole turns of the driver, and the "
-                    f"driver cannot make one: {ends[1].words(start)} Change the lengths of the bodies that meet there, "
-                    "or drive by mechanism.driver.swing."
+                    f"The {body} carries a bearing, whose balls are followed over whole turns of the driver, and the "
+                    f"driver cannot make one: {ends[1].words(start, what)} Change the lengths of the bodies that meet "
+                    "there, or drive by mechanism.driver.swing."
                 )
             raise RequestError(
-                f"The angle of {what} changes by more than three eighths of a turn while the driver turns by 7.5 "
+                f"The angle of {body} changes by more than three eighths of a turn while the driver turns by 7.5 "
                 "degrees: which way round is unknown. Change lengths so that no joint passes another so near."
             )
 

@@ -376,6 +376,11 @@ def speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
 
     mechanism = read_scene(scene).mechanism
     assert mechanism is not None
+    if mechanism.driver.swing is not None:
+        raise RequestError(
+            "What is written integrates the driver's motion, by a speed that changes, and this driver swings. Allowed: "
+            "a scene with a bearing, or whose driver turns. Its numbers as samples: ballpass run, ballpass stream."
+        )
     speed = f"{mechanism.driver.speed.value!r} rad/s"
     table = {"time": ["0 s", "1 s"], "speed": [speed, speed]}
     # states of a duty cycle may set the speed by its old name, and are for lives alone
