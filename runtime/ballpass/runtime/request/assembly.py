@@ -16,7 +16,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN
+from ballpass.runtime.time.turning import TURN, past
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import Manifest, MarginInfo, MechanismInfo
@@ -61,7 +61,7 @@ class Position:
     def words(self, start: float, what: str) -> str:
         """A sentence; `start` is the driver's angle at t = 0 [rad], `what` what that is called."""
         does = "branches" if self.branches else "cannot be assembled"
-        place = math.degrees(start + self.place)
+        place = math.degrees(past(start + self.place))
         return (
             f"The linkage {does} at joint {self.info.joint!r} at {what} {place:.2f} deg "
             f"({self.info.description}: margin {self.margin:.4g})."
