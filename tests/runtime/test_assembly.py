@@ -168,3 +168,31 @@ def test_a_driver_that_a_torque_turns_is_refused_where_the_linkage_branches(mode
     model = model_of(BY_TORQUE.format(torque=400, crank=1.0))
     with pytest.raises(RequestError, match=r"branches at joint 'C' at crank angle 90\.00 deg"):
         model.simulate()
+
+
+def test_a_driver_keeps_to_its_range(model_of: Callable[..., Model]) -> None:
+    """A crank that turns round, by a torque and at constant speed; whole turns count."""
+    text = BY_TORQUE.format(torque=40, crank=0.8).replace(
+        "[mechanism.driver]", '[mechanism.driver]\nrange = { start = "-400 deg", end = "60 deg" }'
+    )
+    with pytest.raises(
+        IntegrationError, match=r"crank angle 60\.\d+ deg.*range is from -400\.0000 to 60\.0000"
+    ) as left:
+        model_of(text).simulate(rtol=1e-9)
+    assert left.value.status is Status.LOCKED
+    assert np.rad2deg(left.value.partial["driver.angle"].max()) < 60.0
+    assert np.rad2deg(model_of(text).simulate(duration=0.1)["driver.angle"].max()) < 60.0
+    given = text[: text.index("[mechanism.driver.torque]")] + text[text.index("[mechanism.frame") :]
+    model = model_of(given.replace('outputs = ["driver.angle"]', ""))
+    for speed, most in ((1.0, math.radians(15.0)), (-2.0, math.radians(445.0))):
+        model.simulate(duration=0.999 * most / abs(speed), parameters={SPEED: speed})
+        with pytest.raises(RequestError, match="The driver's range ends at crank angle"):
+            model.simulate(duration=1.001 * most / abs(speed), parameters={SPEED: speed})
+    with pytest.raises(RequestError, match="starts outside of its range"):
+        model.simulate(duration=0.1, parameters={START: math.radians(70.0)})
+
+
+def test_a_range_makes_a_linkage_that_branches_run(model_of: Callable[..., Model]) -> None:
+    text = BY_TORQUE.format(torque=-1, crank=1.0)
+    inside = text.replace("[mechanism.driver]", '[mechanism.driver]\nrange = { start = "10 deg", end = "89 deg" }')
+    assert len(model_of(inside).simulate(duration=0.1).t) > 1

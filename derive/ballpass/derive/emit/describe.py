@@ -12,7 +12,7 @@ from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
-from ballpass.derive.scene.records import FRAME
+from ballpass.derive.scene.records import FRAME, quantities_of
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract import manifest as mf
@@ -89,6 +89,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     return mf.MechanismInfo(
         speed=drive.first_speed.name,
         start_angle=drive.first_angle.name,
+        range=() if mechanism.driver.range is None else tuple(q.path for q in quantities_of(mechanism.driver.range)),
         swing="" if mechanism.driver.swing is None else mechanism.driver.swing.path,
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
         points=tuple(info_of(mf.PointInfo, p) for p in linkage.points),

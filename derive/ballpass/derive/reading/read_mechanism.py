@@ -25,6 +25,7 @@ from ballpass.derive.scene.records import (
     POSITION,
     Body,
     Driver,
+    DriverRange,
     Force,
     Joint,
     Mechanism,
@@ -90,7 +91,7 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
 
 def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
-        driver.know(*keys_of(Driver), "swing", "table", "torque", "flywheel")
+        driver.know(*keys_of(Driver), "range", "swing", "table", "torque", "flywheel")
         by_torque = driver.has("torque")
         joint, start = (keys_of(Driver)[name].read(driver, name) for name in ("joint", "start_angle"))
         speed, over_time = _read_table(driver) if driver.has("table") else (None, None)
@@ -102,6 +103,7 @@ def _read_driver(table: Table) -> Driver:
             joint=joint,
             speed=speed,
             start_angle=start,
+            range=_read_range(driver) if driver.has("range") else None,
             swing=None if swing is None else swing.amplitude,
             table=over_time,
             torque=_read_torque(driver) if by_torque else None,
@@ -109,10 +111,15 @@ def _read_driver(table: Table) -> Driver:
         )
 
 
+def _read_range(driver: Table) -> DriverRange:
+    with driver.table("range", "start and end") as data:
+        return read_record(DriverRange, data)
+
+
 def _read_swing(driver: Table) -> OscillatingDriver:
     """Its amplitude and frequency; faults where another key gives the motion."""
     driver.refuse(
-        ("speed", "table", "torque"),
+        ("speed", "table", "torque", "range"),
         "the swing gives the driver's motion",
         allowed="one of speed, table, swing, and speed with torque",
         remedy="delete the key, or the swing",

@@ -190,6 +190,14 @@ def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
         mechanism.driver.torque.check(checker)
     if mechanism.driver.table is not None:
         _check_speeds(checker, mechanism.driver)
+    if (limits := mechanism.driver.range) is not None and limits.start.value >= limits.end.value:
+        checker.fault(
+            limits.end.path,
+            "the driver's range ends where it starts, or before",
+            f"{checker.show(limits.start)}, {checker.show(limits.end)}",
+            "an end above the start; whole turns count, as in 400 deg",
+            "exchange start and end",
+        )
     for force in mechanism.forces:
         force.law.check(checker)
 

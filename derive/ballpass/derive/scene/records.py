@@ -190,6 +190,14 @@ class OscillatingDriver:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DriverRange:
+    """Angles within which a driver stays [rad]."""
+
+    start: SceneNumber = quantity("rad", "Least angle of the driver", r"\theta_{1,-}", "-60 deg")
+    end: SceneNumber = quantity("rad", "Largest angle of the driver", r"\theta_{1,+}", "60 deg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
     """The joint (revolute, frame to a body) turned from `start_angle` [rad] at t = 0.
 
@@ -198,7 +206,7 @@ class Driver:
     Without `table` and `torque` the `speed` [rad/s] is constant, else it is that at t = 0.  A `table` gives it over
     time.  With the amplitude of a `swing` [rad] it is the frequency [Hz], and the start angle is the mean one.  A
     `torque` is a record of `ballpass.derive.drive` that this layer only stores.  With table, swing or torque a
-    `flywheel` [kg*m^2] (None: none) turns with the driven body.
+    `flywheel` [kg*m^2] (None: none) turns with the driven body.  Runs stay within a `range`.
     """
 
     joint: str = TextKey(
@@ -215,6 +223,7 @@ class Driver:
     start_angle: SceneNumber = quantity(
         "rad", "Angle of the driver at the start", r"\theta_{1,0}", "0 deg", default="0 deg"
     )
+    range: DriverRange | None = None
     swing: SceneNumber | None = None
     table: SpeedOverTime | None = None
     torque: Any = None

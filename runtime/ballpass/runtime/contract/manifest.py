@@ -372,6 +372,7 @@ class MechanismInfo:
     rate: str = ""
     driver: str = ""  # the joint that is turned
     turns: tuple[tuple[str, int], ...] = ()
+    range: tuple[str, ...] = ()  # least and largest angle within which runs keep the driver
     swing: str = ""  # of a driver that swings: its amplitude; `speed` and `start_angle` are those of the phase
     springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 

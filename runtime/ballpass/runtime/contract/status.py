@@ -34,8 +34,8 @@ class Status(Enum):
         "a heavier flywheel, a higher initial speed, or less load."
     )
     LOCKED = (
-        "The driver has reached the end of the angles for which the linkage is valid: it locks there. Take a shorter "
-        "run, loads or a torque with which the driver turns back before, or other lengths."
+        "The driver has come to the end of its range, or to where the linkage locks. Take a shorter run, loads or a "
+        "torque with which the driver turns back before, or other lengths."
     )
     VOID = "The rings moved as they do in no bearing."
     INTEGRATOR_FAILED = (

@@ -48,18 +48,20 @@ class Position:
     angle : up to which it is valid, past the start angle, negative where it lies before that [rad]
     place : of the dyad's position where its margin is least [rad]
     margin : the least one there [1]
-    info : of the dyad
+    info : of the dyad; None where the scene's range of the driver ends
     branches : whether the dyad can be assembled on both sides; else it locks
     """
 
     angle: float
     place: float
     margin: float
-    info: MarginInfo
+    info: MarginInfo | None
     branches: bool
 
     def words(self, start: float, what: str) -> str:
         """A sentence; `start` is the driver's angle at t = 0 [rad], `what` what that is called."""
+        if self.info is None:
+            return f"The driver's range ends at {what} {math.degrees(start + self.place):.2f} deg."
         does = "branches" if self.branches else "cannot be assembled"
         place = math.degrees(past(start + self.place))
         return (
@@ -77,13 +79,29 @@ def valid_angles(model: LoadedModel, numbers: Numbers) -> tuple[Position, Positi
         It cannot be assembled at the start.
     """
     mechanism = model.manifest.mechanism
-    if mechanism is None or not mechanism.margins:
+    if mechanism is None or not (mechanism.margins or mechanism.range):
         return None
     key = numbers.p.tobytes()
     known: tuple[bytes, tuple[Position, Position] | None] | None = model.valid_angles
     if known is None or known[0] != key:
-        known = model.valid_angles = key, _valid_angles(model, numbers, mechanism)
+        ends = _valid_angles(model, numbers, mechanism) if mechanism.margins else None
+        known = model.valid_angles = key, _within_range(numbers, mechanism, ends) if mechanism.range else ends
     return known[1]
+
+
+def _within_range(
+    numbers: Numbers, mechanism: MechanismInfo, ends: tuple[Position, Position] | None
+) -> tuple[Position, Position]:
+    """Ends of the scene's range of the driver, where the linkage is valid up to there."""
+    first, last = (numbers.values[name] - numbers.values[mechanism.start_angle] for name in mechanism.range)
+    if not first <= 0.0 <= last:
+        raise RequestError(f"{mechanism.start_angle}: the driver starts outside of its range, mechanism.driver.range.")
+    one, other = (
+        Position(angle=angle, place=angle, margin=math.nan, info=None, branches=False) for angle in (first, last)
+    )
+    if ends is None:
+        return one, other
+    return max(one, ends[0], key=lambda end: end.angle), min(other, ends[1], key=lambda end: end.angle)
 
 
 def _valid_angles(model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo) -> tuple[Position, Position] | None:
@@ -179,7 +197,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers, end: float = math.inf) 
     if ends is not None:
         low, high = _reached(model, numbers, end)
         stops = timeline.is_free(manifest) and math.isfinite(end)
-        beyond = zip(ends, (low <= ends[0].angle, high >= ends[1].angle), strict=True)
+        beyond = zip(ends, (low < ends[0].angle, high > ends[1].angle), strict=True)
         if refused := [one for one, reached in beyond if reached and (one.branches or not stops)]:
             first, last = (math.degrees(start + one.angle) for one in ends)
             turns = " The driver cannot make a whole turn." if high - low >= TURN and what == CRANK_ANGLE else ""

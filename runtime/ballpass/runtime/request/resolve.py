@@ -138,8 +138,8 @@ def resolve(
     method, reason = choose_method(model, request.method or settings.method, stepper=stepper)
     if method not in STEPPERS and may_lock(model, numbers):
         raise RequestError(
-            f"method {method}: a torque drives a linkage that locks, and only the project's own stepper finds where. "
-            "Take --method stepper; it needs a C compiler."
+            f"method {method}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
+            "and only the project's own stepper finds when. Take --method stepper; it needs a C compiler."
         )
     if method in STEPPERS:
         magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, stretch, span.begin)

@@ -10,39 +10,44 @@ from __future__ import annotations
 import numpy as np
 
 from ballpass.runtime.native.stepper import Stepper
-from ballpass.runtime.request.assembly import LOCKED, margins_at, may_lock
+from ballpass.runtime.request.assembly import LOCKED, margins_at, may_lock, valid_angles
 from ballpass.runtime.request.resolve import Run
 
-#: Parts of a step in which a reversal is sought, and in which it is refined.
-PARTS, FINE = 4, 64
+#: Parts of a step in which a reversal is sought, those in which the moment is sought, and how often.
+PARTS, FINE, REFINED = 4, 64, 4
 
 
 def driver_stop(run: Run, stepper: Stepper, kept: np.ndarray) -> tuple[float, np.ndarray] | None:
-    """Time [s] and state, shape (states,), at which the linkage locks; None where it does not.
+    """Time [s] and state, shape (states,), at which the linkage locks or the driver's range ends; None where neither.
 
     Parameters
     ----------
     kept : accepted steps of the run so far, see `loop.KeptSteps`
     """
     mechanism = run.model.manifest.mechanism
-    if mechanism is None or not may_lock(run.model, run.numbers) or not len(kept):
+    limits = valid_angles(run.model, run.numbers)
+    if mechanism is None or limits is None or not may_lock(run.model, run.numbers) or not len(kept):
         return None
     angle, rate = (run.model.states.index(name) for name in (mechanism.angle, mechanism.rate))
 
-    def margins(states: np.ndarray) -> np.ndarray:
+    def beyond(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States, and which of them the linkage or the range does not have."""
+        states = stepper.read(kept, times)
         turned = states[:, angle] - run.numbers.values[mechanism.start_angle]
-        return np.asarray(margins_at(run.model, run.numbers, turned).min(axis=1))
+        outside = ~((turned >= limits[0].angle) & (turned <= limits[1].angle))
+        if mechanism.margins:
+            outside |= ~(margins_at(run.model, run.numbers, turned).min(axis=1) > LOCKED)
+        return states, outside
 
     ends = np.concatenate([[run.begin], kept[:, 0]])
     times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(PARTS) / PARTS).ravel(), ends[-1])
-    states = stepper.read(kept, times)
-    states = states[: np.argmin([*np.all(np.isfinite(states), axis=1), False])]
+    states, outside = beyond(times)
     back = np.flatnonzero(states[:-1, rate] * states[1:, rate] <= 0.0)
-    near = [stepper.read(kept, np.linspace(times[k], times[k + 1], FINE)) for k in back.tolist()]
-    finer = [np.linspace(times[k], times[k + 1], FINE) for k in back.tolist()]
-    times, states = np.concatenate([times[: len(states)], *finer]), np.concatenate([states, *near])
-    closed = np.flatnonzero(~(margins(states) > LOCKED))
-    if not len(closed):
-        return None
-    first = closed[np.argmin(times[closed])]
-    return float(times[first]), states[first]
+    times = np.unique(np.concatenate([times, *(np.linspace(times[k], times[k + 1], FINE) for k in back.tolist())]))
+    for _ in range(REFINED):
+        states, outside = beyond(times)
+        if not np.any(outside):
+            return None
+        first = int(np.argmax(outside))
+        times = np.linspace(times[max(first - 1, 0)], times[first], FINE)
+    return float(times[-1]), beyond(times[-1:])[0][0]

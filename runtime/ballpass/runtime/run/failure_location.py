@@ -93,8 +93,13 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
 
 
 def locked_words(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> str:
-    """A sentence on the dyad that locks at a state, of shape (states,); empty where none does."""
+    """A sentence on the dyad that locks at a state, of shape (states,), or the range that ends; empty where neither."""
     mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.range and mechanism.angle:
+        turned = float(state[model.states.index(mechanism.angle)])
+        first, last = (numbers.values[name] for name in mechanism.range)
+        if not first <= turned <= last:
+            return f"The driver's range is from {math.degrees(first):.4f} to {math.degrees(last):.4f} deg."
     if mechanism is None or not mechanism.margins:
         return ""
     u = timeline.inputs_at(model.manifest, numbers.values, time)
