@@ -256,24 +256,16 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
-    kernel = model.kernel("assembly")
-    kernel.run(there)
-    (margins,) = kernel.outputs.values()
-    heights = margins.tolist()
-    if all(height > 0.0 for height in heights):  # NaN: it cannot be assembled
-        return
-    angle = math.degrees(timeline.crank_angle(model.manifest, numbers.values, t))
-    faults = [
-        f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
-        f"({info.description}: margin {height:.4g})."
-        for info, height in zip(mechanism.margins, heights, strict=True)
-        if not height > 0.0
-    ]
-    raise RequestError(
-        "\n".join(faults)
-        + "\nChange the lengths of the bodies that meet at the joint, or ask at an angle at which they "
-        "reach each other."
-    )
+    margins = model.kernel("assembly")(there).tolist()
+    row = next((row for row, margin in enumerate(margins) if not margin > 0.0), None)  # NaN: it cannot be assembled
+    if row is not None:
+        angle = math.degrees(timeline.crank_angle(model.manifest, numbers.values, t))
+        info = mechanism.margins[row]
+        raise RequestError(
+            f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
+            f"({info.description}: margin {margins[row]:.4g}).\nChange the lengths of the bodies that meet at the "
+            "joint, or ask at an angle at which they reach each other."
+        )
 
 
 def margins_at(model: LoadedModel, numbers: Numbers, angles: np.ndarray) -> np.ndarray:
