@@ -276,7 +276,7 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
             if bearing.coupling == "two-way"
         ]
         if axis is not None and scene.coupled:
-            coupled.append(Coupled(inertias=axis.tilting, efforts=axis.gyroscopic(drive.speed)))
+            coupled.append(Coupled(inertias=axis.tilting, efforts=axis.gyroscopic(drive.driven[1])))
         applied = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
         with _noted(errors):
             reactions = derive_reactions(linkage, applied, _moments(scene))

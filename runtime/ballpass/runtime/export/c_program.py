@@ -137,7 +137,7 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
     if may_lock(model, model.numbers(None)):
         raise RequestError(
             f"{manifest.scene}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
-            "and what is exported does not find when. Allowed: a linkage that turns round, without mechanism.driver.range."
+            "and what is exported does not find when. Allowed: a linkage that turns round, without a driver.range."
         )
     texts = {
         "scene.h": scene_header(manifest),
