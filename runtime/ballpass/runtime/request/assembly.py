@@ -119,7 +119,7 @@ def _valid_angles(model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo
     if least.min() > DEAD_CENTER and all(margins(np.array([a]))[0].min() > DEAD_CENTER for a in finer):
         return None
     # a minimum between the last angle and the first lies before the start
-    places = np.unique(np.concatenate([angles, np.mod(finer, TURN)]))
+    places = np.unique(np.concatenate([angles, past(np.array(finer, dtype=float))]))
     rows = margins(places)
     bad = np.flatnonzero(rows.min(axis=1) <= DEAD_CENTER)
     start = math.degrees(timeline.start_angle(model.manifest, numbers.values))
