@@ -63,7 +63,7 @@ class RunFailed(SimulationError):
         self, end: End, time: float, step: float, state: np.ndarray, place: FailureLocation, detail: str
     ) -> None:
         self.end, self.time, self.step, self.state, self.place, self.detail = end, time, step, state, place, detail
-        self.status = Status.LOCKED if place.locked else STATUS_OF_END[end]
+        self.status = Status.LOCKED if place.locked and end is not End.VOID else STATUS_OF_END[end]
         angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg"
         super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}. {detail} {place.words}".rstrip())
 

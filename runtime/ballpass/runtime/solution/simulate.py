@@ -106,7 +106,7 @@ def simulate(
     if failure is not None:
         state = failure.state if isinstance(failure, RunFailed) else last
         place = locate_failure(model, numbers, failure.time, state)
-        status = Status.LOCKED if place.locked else failure.status
+        status = Status.LOCKED if place.locked and failure.status is not Status.VOID else failure.status
     done = trajectory.finished
     solution = Solution(
         t=trajectory.t[:done],
