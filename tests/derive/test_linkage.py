@@ -26,9 +26,9 @@ from linkages import (
 )
 from quick_cases import long_but
 
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import dot
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
-from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import Joint, Mechanism
 
@@ -223,46 +223,19 @@ def test_shipped_linkages_turn_all_the_way(name):
     check_assembly(linkage, machine.values)
 
 
-def test_locked_four_bar_is_named_with_joint_and_angle():
+def test_a_four_bar_that_does_not_reach_at_its_start_is_named_with_joint_and_angle():
     """Coupler and rocker reach 0.20 m; the pin is farther from D than that at 180 deg, where 0.05 + 0.2 m part them."""
     machine = four_bar().with_values(
         mechanism__bodies__coupler__points__C=0.1,
         mechanism__bodies__rocker__points__C=0.1,
         mechanism__frame__points__D__y=0.0,
+        mechanism__driver__start_angle=180.0 * DEGREE,
     )
-    with pytest.raises(
-        LinkageError, match=r"cannot be assembled at joint C at a crank angle of 180\.0000 deg"
-    ) as caught:
+    with pytest.raises(LinkageError, match=r"cannot be assembled at joint C .* 180\.0000 deg") as caught:
         check_assembly(machine.linkage(), machine.values)
     (fault,) = caught.value.faults
     assert fault.key == "mechanism.joints.C"
     assert "B, C, D" in fault.remedy
-
-
-def test_parallelogram_is_refused_at_its_change_point():
-    """All bars collinear at 0 and 180 deg: the linkage does not know which way to go on."""
-    machine = four_bar().with_values(
-        mechanism__bodies__coupler__points__C=0.2,
-        mechanism__bodies__rocker__points__C=0.05,
-        mechanism__frame__points__D__y=0.0,
-    )
-    with pytest.raises(LinkageError, match=r"locks \(dead centre\) at joint C at a crank angle of (0|180)\.0000 deg"):
-        check_assembly(machine.linkage(), machine.values)
-
-
-def test_narrow_gap_between_the_angles_of_the_sweep_is_found():
-    """The crank is longer than the rod by 1e-10 of it: the margin dips at 180.23 deg, off the grid, for 0.004 deg."""
-    machine = crank_slider(crank=0.1 * (1 + 1e-10), rod=0.1).with_values(
-        mechanism__joints__D__direction=(180.23 + 90.0) * DEGREE
-    )
-    with pytest.raises(LinkageError, match=r"joint C at a crank angle of (0\.23|180\.23)"):
-        check_assembly(machine.linkage(), machine.values)
-
-
-def test_crank_longer_than_rod_is_refused():
-    machine = crank_slider(crank=0.12, rod=0.1)
-    with pytest.raises(LinkageError, match=r"joint C at a crank angle of (0|180)\.0000 deg"):
-        check_assembly(machine.linkage(), machine.values)
 
 
 def test_almost_equal_crank_and_rod_are_accepted():

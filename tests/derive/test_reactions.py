@@ -25,9 +25,9 @@ from linkages import (
     yoke_on_rocker,
 )
 
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.errors import LinkageError
 
 STATES = 200

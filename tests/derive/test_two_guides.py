@@ -99,7 +99,7 @@ def test_sliders_stay_on_their_guides(make) -> None:
 
 def test_parallel_guides_are_refused() -> None:
     machine = scotch_yoke().with_values(mechanism__joints__S__direction=math.radians(7))
-    with pytest.raises(LinkageError, match=r"locks .* at joint S") as caught:
+    with pytest.raises(LinkageError, match="cannot be assembled at joint S") as caught:
         check_assembly(machine.linkage(), machine.values)
     assert "squared sine of the angle between guides S and G" in caught.value.faults[0].given
 

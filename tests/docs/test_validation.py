@@ -14,7 +14,7 @@ from scripts.validation import cage_lag, lines, load_zone, spall_lines
 from ballpass.runtime.vibration.diagnosis import diagnosis
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "validation"
-SCRIPTS = ("spall_lines", "load_zone", "cage_lag", "lives", "motions", "classifier", "machines")
+SCRIPTS = ("spall_lines", "load_zone", "cage_lag", "lives", "motions", "classifier", "machines", "mechanisms")
 
 
 def text(name: str) -> str:

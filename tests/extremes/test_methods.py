@@ -137,7 +137,7 @@ def test_a_load_of_1e300_n(press: Press, method: str) -> None:
         ),
         pytest.param(
             lambda model: model.simulate(cycles=1, parameters={CRANK: 0.1}), RequestError,
-            r"cannot be assembled at joint 'C', worst at.*Change the lengths", id="linkage at its dead centre",
+            r"cannot be assembled at joint 'C'.*Change the lengths", id="linkage at its dead centre",
         ),
         pytest.param(
             lambda model: model.simulate(cycles=1, parameters={SPEED: 0.0}), RequestError,

@@ -10,11 +10,11 @@ from typing import Any
 import sympy as sp
 
 from ballpass.derive.drive import KnownDrive
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.forces import BodyTorque, ConstantForce, Forces, PointForce, Windows, derive_forces
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.mechanism.sweep import Evaluator
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import Body, Driver, Force, Gear, Joint, Mechanism, NamedPoint
 from ballpass.derive.terms import TIME

@@ -501,6 +501,14 @@ class Reference:
         if self.mechanism is None:
             speed = number(self.scene["shaft"]["speed"])
             return speed * time, speed, 0.0
+        if "swing" in self.driver:
+            most, rate = (number(self.driver["swing"][key]) for key in ("amplitude", "frequency"))
+            phase, rate = TURN * rate * time, TURN * rate
+            return (
+                self.start + most * math.sin(phase),
+                most * rate * math.cos(phase),
+                -most * rate**2 * math.sin(phase),
+            )
         if "table" not in self.driver:
             speed = number(self.driver["speed"])
             return self.start + speed * time, speed, 0.0

@@ -19,9 +19,9 @@ from linkages import (
 from scipy.optimize import brentq
 from sympy.physics.mechanics import LagrangesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols
 
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.mechanism.sweep import Evaluator
 
 PUNCH = 8964.8
 WINDOW = (237.0, 267.0)

@@ -144,6 +144,8 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
     driven = " at constant drive speed" if torque is None else f", driven by {torque.words()}"
     if table is not None:
         driven = f", driven at a speed by a table of {len(table.time)} times"
+    if mechanism.driver.swing is not None:
+        driven = ", driven to and fro"
     yield Feature(
         name="mechanism",
         path="mechanism",
@@ -216,7 +218,7 @@ def _is_free(load: Load) -> bool:
 def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
     """The bearings alone on their shaft, unloaded; None where there is none, they act back on the
     mechanism, or its speed changes."""
-    if not scene.bearings or scene.coupled or mechanism.driver.table is not None:
+    if not scene.bearings or scene.coupled or mechanism.driver.turns_unevenly:
         return None
     bearings, shaft = [], Shaft(speed=mechanism.driver.speed, ring="inner", mass=None)
     for body in mechanism.bodies:

@@ -86,15 +86,18 @@ def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
     torque = reactions.drive_torque if drive.torque is None else drive.torque
     rows.append(("drive_torque", torque, "N*m", "Torque of the drive on the driven body, counter-clockwise"))
     if drive.whole is not None:
+        _, speed, acceleration = drive.driven
         rows += [
-            ("drive_power", torque * drive.speed, "W", "Power of the drive"),
+            ("drive_power", torque * speed, "W", "Power of the drive"),
             ("driver.angle", drive.whole, "rad", "Angle of the driven body from +x, whole turns counted"),
-            ("driver.speed", drive.speed, "rad/s", "Speed of the driven body"),
-            ("driver.acceleration", drive.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
+            ("driver.speed", speed, "rad/s", "Speed of the driven body"),
+            ("driver.acceleration", acceleration, "rad/s^2", "Angular acceleration of the driven body"),
         ]
     if drive.coordinate is None:
         within = _within_turn(DRIVER_ANGLE, sp.S.Zero)
-        rows.append(("drive_angle", within, "rad", "Angle of the driven body, within the turn"))
+        words = "Angle of the driven body, within the turn"
+        words = words if drive.swings is None else "Phase of the driver's swing, within its period"
+        rows.append(("drive_angle", within, "rad", words))
     for body, pose in ((body.name, linkage.poses[body.name]) for body in linkage.mechanism.bodies):
         words = f"Angle of the x axis of the {body} from +x"
         rows.append((f"body.{body}.angle", sp.atan2(pose.sin, pose.cos), "rad", words))

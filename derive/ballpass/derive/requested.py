@@ -81,7 +81,7 @@ def power_outputs(
         out.append(("weight.power", power_of(weights), "W", "Power of all weights"))
         height = sp.Add(*(-weight.amount * weight.place for weight in weights))
         out.append(("weight.energy", height, "J", "Potential energy of all weights, 0 at the frame's origin"))
-    if linkage.drive.even:  # else it is listed
+    if linkage.drive.whole is None:  # else it is listed
         power = reactions.drive_torque * linkage.drive.speed
         out.append(("drive_power", power, "W", "Power of the drive"))
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2

@@ -8,7 +8,6 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -148,7 +147,7 @@ def derive(scene: Scene) -> System:
     Raises
     ------
     SceneError
-        Where the linkage's topology is wrong, its numbers lock it within a turn, or an output is unknown: all faults
+        Where the linkage's topology is wrong, it cannot be assembled at its start, or an output is unknown: all faults
         that can be reported together, with their lines; `LinkageError` where all are of the linkage.
 
     Examples
@@ -278,7 +277,7 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
             if bearing.coupling == "two-way"
         ]
         if axis is not None and scene.coupled:
-            coupled.append(Coupled(inertias=axis.tilting, efforts=axis.gyroscopic(drive.speed)))
+            coupled.append(Coupled(inertias=axis.tilting, efforts=axis.gyroscopic(drive.driven[1])))
         applied = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
         with _noted(errors):
             reactions = derive_reactions(linkage, applied, _moments(scene))
@@ -331,21 +330,18 @@ def _linked(
     """The linkage and its loads; None, with the faults noted."""
     linkage, forces = None, None
     play: dict[str, Motion] = {}
-    reach: dict[str, float] = {}
     for bearing in scene.bearings:
         if bearing.coupling == "two-way":
             joint = mechanism.joint(bearing.joint or "")
             inner = axis.reference if axis is not None and bearing.tilts else ring(ring_coordinates(bearing), 0)
             play[joint.name] = play_of(bearing, joint, inner)
-            # of several side by side the least play is all that the joint has
-            reach[joint.name] = min(max(bearing.clearance.value, 0.0) / 2.0, reach.get(joint.name, math.inf))
     with _noted(errors):
         slope = axis.slope if axis is not None and scene.coupled else None
         linkage = derive_linkage(mechanism, drive, play, slope)
         with _noted(errors):
             forces = derive_forces(linkage)
         with _noted(errors):
-            check_assembly(linkage, {q.path: q.value for q in scene.quantities}, reach)
+            check_assembly(linkage, {q.path: q.value for q in scene.quantities})
         if forces is None:
             derive_reactions(linkage, (), _moments(scene))  # for its faults
     return None if linkage is None or forces is None else (linkage, forces)
@@ -429,10 +425,11 @@ def _system(parts: _Parts, errors: list[SceneError]) -> System:
         ),
         initial=_initial(parts),
         constants=(
+            *drive.constants,
             *(c for swing in parts.swings for c in swing.constants),
             *(c for model in models for c in model.constants),
             *(c for motion in parts.motions for c in motion.constants),
-            *(*drive.constants, *forces.constants, *parts.own.constants),
+            *(*forces.constants, *parts.own.constants),
             *dict.fromkeys(c for o in named for c in o.constants),
         ),
         definitions=(

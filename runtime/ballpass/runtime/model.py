@@ -25,7 +25,6 @@ from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.ensemble_parts import simulate_parts
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.compile import CompiledLibrary, compile_model
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
 from ballpass.runtime.point.run_start import Initial, start_of
@@ -138,7 +137,6 @@ class Model(PointModel, Questions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
-        self._assembled = b""  # parameters whose linkage was checked last
         self._run_settings: RunInfo | None = None
         if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
@@ -160,20 +158,11 @@ class Model(PointModel, Questions):
         """Integration methods of this model, besides ``auto``."""
         return method_names(self)
 
-    def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
-        """Numbers of a run whose linkage can be assembled; the last ones are not checked again."""
-        numbers = self.numbers(parameters)
-        checked = numbers.p.tobytes()
-        if checked != self._assembled:
-            check_assembly(self, numbers)
-            self._assembled = checked
-        return numbers
-
     def _asked(
         self, parameters: Mapping[str, float] | None, initial: Initial, transient: float | None, **given: Any
     ) -> tuple[Numbers, Request]:
         """Numbers of a run, and its request; RequestError for an unknown word in the place of a start."""
-        numbers = self._runnable(parameters)
+        numbers = self.numbers(parameters)
         start = start_of(self, numbers, initial)
         return numbers, Request(initial=start, transient_cycles=transient, **given)
 

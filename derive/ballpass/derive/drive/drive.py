@@ -38,6 +38,8 @@ class Drive(ABC):
     coordinate : the angle, where it is a state
     passive : the angle as a coordinate on which nothing depends, in a scene that has no other one, where it is known
     whole : the angle with its whole turns, where the speed changes [rad]
+    swings : angle [rad], rate and angular acceleration of the driven body of a driver that swings; `angle` and `speed`
+        are then those of the swing's phase
     torque : on the driven body [N*m]; None where it follows from a given motion
     flywheel : moment of inertia that turns with the driven body [kg*m^2]
     smoothness : of the torque
@@ -55,6 +57,7 @@ class Drive(ABC):
     coordinate: Coordinate | None = None
     passive: Coordinate | None = None
     whole: sp.Expr | None = None
+    swings: tuple[sp.Expr, sp.Expr, sp.Expr] | None = None
     torque: sp.Expr | None = None
     flywheel: sp.Expr = sp.S.Zero
     smoothness: Smoothness = Smoothness.TWICE_SMOOTH
@@ -63,6 +66,11 @@ class Drive(ABC):
         """The drive of a machine that repeats after so many turns: its angle is known within these."""
         inputs = tuple(replace(one, turns=turns) if one.kind == "phase" else one for one in self.inputs)
         return replace(self, inputs=inputs)
+
+    @property
+    def driven(self) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        """Angle [rad], rate [rad/s] and angular acceleration [rad/s^2] of the driven body."""
+        return (self.angle, self.speed, self.acceleration) if self.swings is None else self.swings
 
     @property
     def even(self) -> bool:

@@ -14,6 +14,7 @@ import sympy as sp
 
 from ballpass.derive.drive.angle_state import driver_coordinate
 from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import Driver, Shaft
 from ballpass.derive.terms import TIME, Definition, defined, symbol_of
 from ballpass.derive.variables import DRIVER_ANGLE, Input, gate_of, turned
@@ -72,6 +73,8 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     ----------
     alone : whether nothing else has states; the driver's angle by a table is then integrated along, for runs need one
     """
+    if driver.swing is not None:
+        return _swinging(driver, driver.swing)
     body, first_angle = "the driven body", symbol_of(driver.start_angle)
     turning = TurningInfo(
         name="driver",
@@ -112,6 +115,41 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
         passed=passed,
         passive=passive,
         whole=whole.symbol + passed if passive is None else passive.position,
+    )
+
+
+def _swinging(driver: Driver, amplitude: SceneNumber) -> KnownDrive:
+    """Drive of a driver that swings: its phase turns evenly, and what turns with a driver follows the phase."""
+    words, body = "the phase of the driver's swing", "the driven body"
+    rate = defined("driver.swing.rate", 2 * sp.pi * symbol_of(driver.speed), "rad/s", f"Rate of {words}", r"\omega_1")
+    zero = defined("driver.swing.start", sp.S.Zero, "rad", "Phase of the driver's swing at t = 0", r"\theta_{1,0}")
+    turning = TurningInfo(
+        name="driver",
+        kind="driver",
+        words="the driver",
+        offset=zero.symbol.name,
+        rate=rate.symbol.name,
+        speeds=(rate.symbol.name,),
+    )
+    drive = _at_constant_speed(turning, words, DRIVER_ANGLE, (r"\varphi_1", r"\varphi_{1,0}"), zero.symbol)
+    most, cos, sin = symbol_of(amplitude), sp.cos(DRIVER_ANGLE), sp.sin(DRIVER_ANGLE)
+    turned_to = symbol_of(driver.start_angle) + most * sin
+    second = -most * sin * drive.speed**2
+    words = f"Angular acceleration of {body}"
+    swings = (
+        defined("driver.swing.angle", turned_to, "rad", f"Angle of {body}", r"\theta_1"),
+        defined("driver.rate", most * cos * drive.speed, "rad/s", f"Speed of {body}", r"\dot\theta_1"),
+        defined("driver.swing.acceleration", second, "rad/s^2", words, r"\ddot\theta_1"),
+    )
+    angle, speed, acceleration = (one.symbol for one in swings)
+    return replace(
+        drive,
+        description="the driver swings",
+        constants=(rate, zero),
+        definitions=(*drive.definitions, *swings),
+        flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),
+        whole=angle,
+        swings=(angle, speed, acceleration),
     )
 
 

@@ -13,7 +13,7 @@ from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
-from ballpass.derive.scene.records import FRAME
+from ballpass.derive.scene.records import FRAME, quantities_of
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract import manifest as mf
@@ -85,10 +85,13 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     mechanism, linkage = system.scene.mechanism, system.linkage
     if mechanism is None or linkage is None:
         return None
-    driven = linkage.drive.coordinate
+    drive = linkage.drive
+    driven = drive.coordinate
     return mf.MechanismInfo(
-        speed=mechanism.driver.speed.path,
-        start_angle=mechanism.driver.start_angle.path,
+        speed=drive.first_speed.name,
+        start_angle=drive.first_angle.name,
+        range=() if mechanism.driver.range is None else tuple(q.path for q in quantities_of(mechanism.driver.range)),
+        swing="" if mechanism.driver.swing is None else mechanism.driver.swing.path,
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
         points=tuple(info_of(mf.PointInfo, p) for p in linkage.points),
         margins=tuple(info_of(mf.MarginInfo, m) for m in linkage.margins),

@@ -343,6 +343,8 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
         taken = ca.vertcat(*cosines, *sines)  # functions of time as well
         if not ca.depends_on(angle, t) or ca.depends_on(ca.jacobian(angle, t), t) or ca.depends_on(angle, taken):
             return None
+        if ca.depends_on(angle, ca.vertcat(*cosines, *sines)):  # of a body that swings with one of these angles
+            return None
         for k, known in enumerate(angles):
             if ca.is_equal(known, angle, 4):
                 return k

@@ -10,12 +10,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.assembly import assemble
 from ballpass.derive.mechanism.dyads import Group, Margin, Placement
+from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
@@ -32,8 +35,7 @@ from ballpass.derive.mechanism.kinematics import (
     place,
     subscript,
 )
-from ballpass.derive.mechanism.sweep import locked_positions
-from ballpass.derive.scene.errors import LinkageError
+from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
 from ballpass.derive.terms import Definition
 
@@ -159,36 +161,45 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY, slo
     )
 
 
-def check_assembly(
-    linkage: Linkage, values: Mapping[str, float], reach: Mapping[str, float] = MappingProxyType({})
-) -> None:
-    """Refuse numbers with which the linkage, or the linkage with play, locks at some angle of the driver.
+def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
+    """Refuse numbers with which the linkage cannot be assembled at its start.
 
     Parameters
     ----------
     linkage : from `derive_linkage`
     values : SI value of every parameter, by its path
-    reach : of joints with play, largest distance of the two points of each without load [m]
 
     Raises
     ------
     LinkageError
-        a dyad that cannot be assembled, or only just (a dead centre): names the joint and the crank angle in degrees.
+        a dyad that cannot be assembled: names the joint and the crank angle in degrees.
     KeyError
         a parameter without a value.
     """
-    driven = linkage.poses[linkage.driven]
-    numbers = {**values, **{str(symbol): 0.0 for symbol in linkage.positions}}
-    turns = linkage.turns
-    faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, turns=turns)
-    if not faults and linkage.play:
-        plays = {
-            joint: (tuple(sorted((s for e in motion.position for s in e.free_symbols), key=str)), reach[joint])
-            for joint, motion in linkage.play.items()
-        }
-        faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, plays, turns)
-    if faults:
-        raise LinkageError(faults)
+    driven, start = linkage.poses[linkage.driven], values[linkage.mechanism.driver.start_angle.path]
+    numbers: dict[sp.Symbol, Any] = {sp.Symbol(name, real=True): np.float64(v) for name, v in values.items()}
+    numbers |= dict.fromkeys(linkage.positions, 0.0) | {driven.cos: np.cos(start), driven.sin: np.sin(start)}
+    of_drive = sp.sympify(driven.angle).free_symbols - numbers.keys()  # the angle, or the phase of a swing
+    numbers |= {symbol: start if symbol == driven.angle else 0.0 for symbol in of_drive}
+    evaluator = Evaluator(linkage.definitions, [m.expression for m in linkage.margins], given=(driven.cos, driven.sin))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        margins = [float(margin) for margin in evaluator(numbers)]
+    for margin, placement in zip(margins, linkage.placements, strict=True):
+        if not margin > 0.0:  # dyads behind it cannot be placed
+            joints = ", ".join(placement.dyad.joints)
+            raise LinkageError(
+                [
+                    Fault(
+                        key=f"mechanism.joints.{placement.margin.joint}",
+                        problem=f"the linkage cannot be assembled at joint {placement.margin.joint} at the crank angle "
+                        f"of its start, {np.rad2deg(start):.4f} deg",
+                        given=f"{placement.margin.description}: {margin:.6g} there"
+                        + ("" if math.isfinite(margin) else ": is a length zero?"),
+                        allowed="above 0",
+                        remedy=f"change the lengths between joints {joints}, or mechanism.driver.start_angle",
+                    )
+                ]
+            )
 
 
 def _place_driven(
@@ -200,19 +211,19 @@ def _place_driven(
     play: Play,
     slope: Motion | None,
 ) -> Pose:
-    mark = subscript(body)
-    cos, sin = name_turn(ledger, body, sp.cos(drive.angle), sp.sin(drive.angle), mark)
+    mark, (angle, rate, acceleration) = subscript(body), drive.driven
+    cos, sin = name_turn(ledger, body, sp.cos(angle), sp.sin(angle), mark)
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
     acceleration = ledger.define(
         f"body.{body}.angular_acceleration",
-        drive.acceleration,
+        acceleration,
         "rad/s^2",
         f"angular acceleration of {body}: {drive.description}",
         rf"\ddot{{\varphi}}_{{{mark}}}",
     )
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
-    turn = Turn(cos=cos, sin=sin, rate=drive.speed, acceleration=acceleration, angle=drive.angle)
+    turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration, angle=angle)
     return place(ledger, mechanism, body, turn, joint_point(mechanism, driver, body), pivot, slope)
 
 

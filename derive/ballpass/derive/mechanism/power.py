@@ -35,9 +35,7 @@ def work_of_drive(drive: Drive) -> tuple[Effort, ...]:
 def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
     """Torque of a flywheel on the driven body, besides the torque of the drive."""
     drive = linkage.drive
-    return (
-        (AppliedLoad(body=linkage.driven, torque=-drive.flywheel * drive.acceleration),) if drive.flywheel != 0 else ()
-    )
+    return (AppliedLoad(body=linkage.driven, torque=-drive.flywheel * drive.driven[2]),) if drive.flywheel != 0 else ()
 
 
 def inertia_of(linkage: Linkage) -> tuple[Inertia, ...]:
@@ -53,7 +51,8 @@ def inertia_of(linkage: Linkage) -> tuple[Inertia, ...]:
         if body.inertia is not None and pose.rate != 0:
             inertias.append(Inertia(amount=symbol_of(body.inertia), rate=pose.rate, acceleration=pose.acceleration))
     if drive.flywheel != 0:
-        inertias.append(Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration))
+        _, rate, acceleration = drive.driven
+        inertias.append(Inertia(amount=drive.flywheel, rate=rate, acceleration=acceleration))
     return tuple(inertias)
 
 

@@ -83,7 +83,7 @@ def with_driver(drive: Drive) -> Swing:
 
 def swing_of(linkage: Linkage, body: str) -> Swing:
     """Angle of a body of a linkage, or of its frame."""
-    if body == linkage.driven:
+    if body == linkage.driven and linkage.drive.swings is None:
         return with_driver(linkage.drive)
     pose, positions, period = linkage.pose(body), linkage.positions, linkage.turns
     if sp.sympify(pose.cos).is_number:

@@ -41,13 +41,14 @@ def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way
         return "two-way"
     if (coupling is None or table.missing) and mechanism is not None:  # reported; other keys say what is meant
         return "one-way" if "share" in table.data else "two-way"
-    if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
+    moving = mechanism is not None and (mechanism.driver.torque, mechanism.driver.swing) != (None, None)
+    if coupling == "one-way" and moving:
         table.fault(
             "coupling",
-            "a bearing loaded one-way takes the reaction of a linkage at constant speed",
+            "a bearing loaded one-way takes the reaction of a linkage whose driver turns at a given speed",
             given=show(table.data.get("coupling", "nothing, which is one-way")),
-            allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
-            remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
+            allowed='coupling = "two-way" where [mechanism.driver.torque] drives, or the driver swings',
+            remedy='write coupling = "two-way", and what such a bearing needs; or give the driver\'s speed',
         )
         return "two-way"
     if coupling == "two-way" and mechanism is None:

@@ -25,11 +25,13 @@ from ballpass.derive.scene.records import (
     POSITION,
     Body,
     Driver,
+    DriverRange,
     Force,
     Gear,
     Joint,
     Mechanism,
     NamedPoint,
+    OscillatingDriver,
     SpeedOverTime,
 )
 from ballpass.derive.scene.table import Table, listing, suggest, upright
@@ -56,7 +58,7 @@ FLYWHEEL = number(
     "Moment of inertia that turns with the driven body",
     "J_f",
     "0.5 kg*m^2",
-    when="optional; only with `[mechanism.driver.torque]` or `driver.table`",
+    when="optional; only with `[mechanism.driver.torque]`, `driver.table` or `driver.swing`",
     bounds=NOT_NEGATIVE,
 )
 #: Values of the placeholders in the words of the driver's speed, with a torque and without.
@@ -98,18 +100,41 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
 
 def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
-        driver.know(*keys_of(Driver), "table", "torque", "flywheel")
+        driver.know(*keys_of(Driver), "range", "swing", "table", "torque", "flywheel")
         by_torque = driver.has("torque")
         joint, start = (keys_of(Driver)[name].read(driver, name) for name in ("joint", "start_angle"))
         speed, over_time = _read_table(driver) if driver.has("table") else (None, None)
+        swing = _read_swing(driver) if driver.has("swing") else None
+        speed = speed if swing is None else swing.frequency
+        if speed is None:
+            speed = keys_of(Driver, START if by_torque else CONSTANT)["speed"].read(driver, "speed")
         return Driver(
             joint=joint,
-            speed=speed or keys_of(Driver, START if by_torque else CONSTANT)["speed"].read(driver, "speed"),
+            speed=speed,
             start_angle=start,
+            range=_read_range(driver) if driver.has("range") else None,
+            swing=None if swing is None else swing.amplitude,
             table=over_time,
             torque=_read_torque(driver) if by_torque else None,
-            flywheel=_read_flywheel(driver, by_torque or over_time is not None) if driver.has("flywheel") else None,
+            flywheel=_read_flywheel(driver) if driver.has("flywheel") else None,
         )
+
+
+def _read_range(driver: Table) -> DriverRange:
+    with driver.table("range", "start and end") as data:
+        return read_record(DriverRange, data)
+
+
+def _read_swing(driver: Table) -> OscillatingDriver:
+    """Its amplitude and frequency; faults where another key gives the motion."""
+    driver.refuse(
+        ("speed", "table", "torque", "range"),
+        "the swing gives the driver's motion",
+        allowed="one of speed, table, swing, and speed with torque",
+        remedy="delete the key, or the swing",
+    )
+    with driver.table("swing", "amplitude and frequency") as data:
+        return read_record(OscillatingDriver, data)
 
 
 def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None]:
@@ -137,12 +162,12 @@ def _read_torque(driver: Table) -> TorqueLaw | None:
         return read_record(LAWS[name], data)
 
 
-def _read_flywheel(driver: Table, changing: bool) -> SceneNumber:
-    if not changing:
+def _read_flywheel(driver: Table) -> SceneNumber:
+    if not any(map(driver.has, ("torque", "table", "swing"))):
         driver.fault(
             "flywheel",
             "at constant speed a flywheel is without effect",
-            given="[mechanism.driver.flywheel] without [mechanism.driver.torque] or [mechanism.driver.table]",
+            given="[mechanism.driver.flywheel] without [mechanism.driver.torque], [mechanism.driver.table] or a swing",
             allowed="a flywheel where the speed changes",
             remedy="delete the flywheel, or add [mechanism.driver.torque]",
         )

@@ -79,6 +79,8 @@ def _top() -> Iterator[Section]:
 def _mechanism() -> Iterator[Section]:
     yield _of("mechanism", gravity=read_mechanism.GRAVITY)
     yield _of("mechanism.driver", records.Driver, fill=read_mechanism.CONSTANT)
+    yield _of("mechanism.driver.range", records.DriverRange)
+    yield _of("mechanism.driver.swing", records.OscillatingDriver)
     yield _of("mechanism.driver.table", records.SpeedOverTime)
     yield _of("mechanism.driver.flywheel", inertia=read_mechanism.FLYWHEEL)
     torques = {name: (keys_of(law), choices_of(law)) for name, law in TORQUE_LAWS.items()}

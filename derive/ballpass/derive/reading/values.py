@@ -24,7 +24,7 @@ from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, Shaft,
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.units import split_setting
-from ballpass.runtime.time.turning import Turning
+from ballpass.runtime.time.turning import TURN, Turning
 
 #: Last parts of keys of the file that are no quantities, for the message about an override of one.
 _STRUCTURE = ("balls", "designation", "joint", "law", "support")
@@ -190,6 +190,14 @@ def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
         mechanism.driver.torque.check(checker)
     if mechanism.driver.table is not None:
         _check_speeds(checker, mechanism.driver)
+    if (limits := mechanism.driver.range) is not None and limits.start.value >= limits.end.value:
+        checker.fault(
+            limits.end.path,
+            "the driver's range ends where it starts, or before",
+            f"{checker.show(limits.start)}, {checker.show(limits.end)}",
+            "an end above the start; whole turns count, as in 400 deg",
+            "exchange start and end",
+        )
     for force in mechanism.forces:
         force.law.check(checker)
 
@@ -321,7 +329,8 @@ def _check_run(checker: Checker, scene: Scene) -> None:
 def _turning(source: Driver | Shaft) -> Turning:
     """The angle of driver or shaft over time, of its first speed where no table gives it."""
     table = source.table if isinstance(source, Driver) else None
-    times, speeds = [], [source.speed.value]
+    swings = isinstance(source, Driver) and source.swing is not None
+    times, speeds = [], [source.speed.value * (TURN if swings else 1.0)]
     if table is not None:
         times = [number.value for number in table.time]
         speeds += [number.value for number in table.later_speed]

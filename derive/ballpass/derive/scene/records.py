@@ -250,14 +250,31 @@ class SpeedOverTime:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OscillatingDriver:
+    """Angle of a driver that swings: ``start_angle + amplitude * sin(2 pi frequency t)`` [rad], [Hz]."""
+
+    amplitude: SceneNumber = positive("rad", "Amplitude of the driver's swing", r"\hat\theta_1", "30 deg")
+    frequency: SceneNumber = positive("Hz", "Frequency of the driver's swing", "f_1", "1 Hz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverRange:
+    """Angles within which a driver stays [rad]."""
+
+    start: SceneNumber = quantity("rad", "Least angle of the driver", r"\theta_{1,-}", "-60 deg")
+    end: SceneNumber = quantity("rad", "Largest angle of the driver", r"\theta_{1,+}", "60 deg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
     """The joint (revolute, frame to a body) turned from `start_angle` [rad] at t = 0.
 
     The driver's angle is that of the driven body's x axis from +x.
 
     Without `table` and `torque` the `speed` [rad/s] is constant, else it is that at t = 0.  A `table` gives it over
-    time.  A `torque` is a record of `ballpass.derive.drive` that this layer only stores.  With either a `flywheel`
-    [kg*m^2] (None: none) turns with the driven body.
+    time.  With the amplitude of a `swing` [rad] it is the frequency [Hz], and the start angle is the mean one.  A
+    `torque` is a record of `ballpass.derive.drive` that this layer only stores.  With table, swing or torque a
+    `flywheel` [kg*m^2] (None: none) turns with the driven body.  Runs stay within a `range`.
     """
 
     joint: str = TextKey(
@@ -268,20 +285,22 @@ class Driver:
         "Speed of the driverSTART",
         r"\omegaZERO",
         "500 rpm",
-        when="required without `driver.table`, else refused",
+        when="required without `driver.table` and `driver.swing`, else refused",
         note="counter-clockwise positive; constant, with `[mechanism.driver.torque]` that at t = 0, which may be zero",
     )
     start_angle: SceneNumber = quantity(
         "rad", "Angle of the driver at the start", r"\theta_{1,0}", "0 deg", default="0 deg"
     )
+    range: DriverRange | None = None
+    swing: SceneNumber | None = None
     table: SpeedOverTime | None = None
     torque: Any = None
     flywheel: SceneNumber | None = None
 
     @property
     def turns_unevenly(self) -> bool:
-        """Whether its angle is a state."""
-        return self.table is not None or self.torque is not None
+        """Whether its speed changes."""
+        return any(one is not None for one in (self.swing, self.table, self.torque))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

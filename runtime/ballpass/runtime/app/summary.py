@@ -274,7 +274,7 @@ def _drive_work(model: Model, sol: Solution) -> float | None:
     None where a torque drives, or the driver makes no whole turn.
     """
     mechanism, numbers = sol.manifest.mechanism, model.numbers(sol.parameters)
-    if mechanism is None or mechanism.angle:
+    if mechanism is None or mechanism.angle or mechanism.swing:
         return None
     run = run_of(model, numbers, sol)
     window = whole_cycles(run.span, Repetition.of(sol.manifest, numbers.values).turns)
@@ -293,7 +293,7 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
     """Condition numbers of Eq. (1) over a turn; warns where they pass a bound."""
     if not has_reactions(model):
         return {}
-    found = conditioning(model, model.numbers(sol.parameters))
+    found = conditioning(model, model.numbers(sol.parameters), float(sol.t[-1]))
     angles = {"unscaled": found.unscaled_angle, "scaled": found.scaled_angle, "unit": "rad"}
     conditions = {"unscaled": found.unscaled, "scaled": found.scaled, "unit": "1", "crank_angle": angles}
     return {"reaction_condition": conditions}

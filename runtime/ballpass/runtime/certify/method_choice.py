@@ -11,7 +11,6 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
@@ -58,7 +57,6 @@ def stepper_run(model: LoadedModel, numbers: Numbers, request: Request) -> Run:
     RequestError
         A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
     """
-    check_assembly(model, numbers)
     return resolve(model, numbers, replace(request, method="stepper", kinks=None)).check_steady()
 
 

@@ -29,7 +29,6 @@ from ballpass.runtime.contract.errors import BallpassWarning, RequestError, Simu
 from ballpass.runtime.contract.parameters import Numbers, unknown_name, wrong_unit
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.slopes import KinkWarning
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -323,9 +322,7 @@ class QuantityFunction:
         return rows, able, given.shape[:-1]
 
     def _numbers(self, row: Array) -> Numbers:
-        numbers = self._model.numbers(self._fixed | dict(zip(self.wrt, row.tolist(), strict=True)))
-        check_assembly(self._model, numbers)
-        return numbers
+        return self._model.numbers(self._fixed | dict(zip(self.wrt, row.tolist(), strict=True)))
 
     def _by_ensemble(self, rows: Array, tell: Callable[[float], None] | None) -> Array:
         """Values of the quantities, shape (rows, quantities)."""

@@ -42,7 +42,6 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import DEFLECTION
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
 from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
@@ -167,7 +166,6 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     """
     manifest = model.manifest
     refuse_jumps(manifest, "sensitivity")
-    check_assembly(model, numbers)
     quantities = quantities_of(model, _listed("of", query.of, default_quantities(manifest)))
     names = parameters_named(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
     request = replace(query.request, method=query.method, rtol=query.rtol, kinks=query.kinks)

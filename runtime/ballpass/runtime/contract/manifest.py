@@ -374,6 +374,8 @@ class MechanismInfo:
     repeats: int = 1  # turns of the driver after which all bodies are where they were: gears
     wheels: tuple[tuple[str, str, str, str, float], ...] = ()  # bodies in mesh, on axes; share of the first
     turns: tuple[tuple[str, int], ...] = ()
+    range: tuple[str, ...] = ()  # least and largest angle within which runs keep the driver
+    swing: str = ""  # of a driver that swings: its amplitude; `speed` and `start_angle` are those of the phase
     springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 
 

@@ -33,6 +33,10 @@ class Status(Enum):
         "The driver has stalled: at the edge of a window it turns back again and again. Give the drive more torque or "
         "a heavier flywheel, a higher initial speed, or less load."
     )
+    LOCKED = (
+        "The driver has come to the end of its range, or to where the linkage locks. Take a shorter run, loads or a "
+        "torque with which the driver turns back before, or other lengths."
+    )
     VOID = "The rings moved as they do in no bearing."
     INTEGRATOR_FAILED = (
         "The integrator could not go on: the tolerance asks for steps too small or too many. "

@@ -37,6 +37,7 @@ from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.method_tables import METHOD_TABLES, method_tables
+from ballpass.runtime.request.assembly import may_lock
 from ballpass.runtime.request.locating import has_kinks
 
 #: Flags of the compiler for a shared library, or replaced here.
@@ -132,6 +133,11 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
             f"{manifest.scene}: the model has no states, because all follows from the driver's angle, so that there is "
             "nothing to integrate. Name the scene file instead: `ballpass export` and `ballpass explore` derive it "
             f"with the driver's speed as a table over time. The functions of this model are in {folder / 'model.c'}."
+        )
+    if may_lock(model, model.numbers(None)):
+        raise RequestError(
+            f"{manifest.scene}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
+            "and what is exported does not find when. Allowed: a linkage that turns round, without a driver.range."
         )
     texts = {
         "scene.h": scene_header(manifest),

@@ -20,7 +20,6 @@ from ballpass.runtime.contract.defaults import SENSITIVITY
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.fit.measured import Trial
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.nodes import fixed_nodes
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -235,7 +234,6 @@ class Misfit:
         model, trial = self._model, self._trials[place]
         found = {one.name: float(value) for one, value in zip(self.ranges, values, strict=False)}
         numbers = model.numbers(self._fixed | dict(trial.parameters) | found)
-        check_assembly(model, numbers)
         if len(trial.t):
             # of one length for all shifts, so that its steps are the same
             length = self._begin + float(trial.t[-1]) + self._after

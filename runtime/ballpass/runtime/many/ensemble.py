@@ -27,7 +27,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, unknown_name, whole
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
-from ballpass.runtime.many.members import Members, Spans, Table, make_members, read_table
+from ballpass.runtime.many.members import Members, Spans, Table, check_assembled_members, make_members, read_table
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
@@ -248,7 +248,8 @@ def simulate_many(
     members = make_members(model, columns)
     skipped = model.run_settings.transient_cycles if transient is None else real(transient)
     span = _spans(model, members, cycles, duration, skipped)
-    in_lanes = driver is not None and lanes and at_kinks != LOCATED
+    may_lock = check_assembled_members(model, members, span)
+    in_lanes = driver is not None and lanes and at_kinks != LOCATED and not may_lock
     by_steps = [item for item in chosen if is_reduced(model, item)]
     others = [item for item in chosen if not is_reduced(model, item)]
     reduced = {row for item in by_steps for row in needed_rows(item)}

@@ -17,7 +17,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name, wrong_unit
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.request.assembly import check_assembly, valid_angles
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.breakpoints import breakpoints
 from ballpass.runtime.time.turning import ANGLE_RESOLUTION, TURN
@@ -172,9 +172,7 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
         columns |= {info.name: c[:, k] for k, info in enumerate(manifest.constants)}
     _check_knots(manifest, columns, refused)
     initial = np.ascontiguousarray(np.reshape([columns[name] for name in manifest.initial], (-1, count)).T)
-    members = Members(varied=varied, columns=columns, p=p, c=c, initial=initial, refused=refused)
-    _check_assembly(model, members)
-    return members
+    return Members(varied=varied, columns=columns, p=p, c=c, initial=initial, refused=refused)
 
 
 def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
@@ -191,30 +189,6 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
             breakpoints(manifest, values, 0.0, 1.0)
         except RequestError as fault:
             refused[member] = str(fault)
-
-
-def _check_assembly(model: LoadedModel, members: Members) -> None:
-    """Note members whose linkage cannot be assembled; each distinct geometry is checked once."""
-    manifest = model.manifest
-    mechanism = manifest.mechanism
-    if mechanism is None or not mechanism.margins:
-        return
-    function = model.symbolic("assembly")
-    # a turn has every angle for any speed and start, unless the speed is zero
-    timing = [k for k, info in enumerate(manifest.parameters) if info.name in (mechanism.speed, mechanism.start_angle)]
-    parts = [members.columns[mechanism.speed][:, None] == 0.0]
-    for name, rows in (("p", members.p), ("c", members.c)):
-        if name in function.name_in() and rows.shape[1]:
-            used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
-            parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
-    for group in groups(np.column_stack(parts)):
-        member = int(group[0])
-        if member in members.refused:
-            continue
-        try:
-            check_assembly(model, members.numbers(model, member))
-        except RequestError as fault:
-            members.refused.update((int(other), str(fault)) for other in group)
 
 
 def groups(rows: np.ndarray) -> list[np.ndarray]:
@@ -240,3 +214,36 @@ class Spans:
     durations: np.ndarray
     turns: np.ndarray
     starts: np.ndarray
+
+
+def check_assembled_members(model: LoadedModel, members: Members, spans: Spans) -> bool:
+    """Note members whose linkage is not valid in their runs; each distinct geometry is swept once.
+
+    Returns whether a torque may turn some to where they lock: these do not run in lanes.
+    """
+    mechanism = model.manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return False
+    locks = False
+    function = model.symbolic("assembly")
+    # a turn has every angle for any speed and start
+    speed_and_start = (mechanism.speed, mechanism.start_angle)
+    timing = [k for k, info in enumerate(model.manifest.parameters) if info.name in speed_and_start]
+    parts = [np.zeros((len(members), 0))]
+    for name, rows in (("p", members.p), ("c", members.c)):
+        if name in function.name_in() and rows.shape[1]:
+            used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
+            parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
+    for group in groups(np.column_stack(parts)):
+        for member in group.tolist():
+            if member in members.refused:
+                continue
+            numbers = members.numbers(model, member)
+            try:
+                check_assembly(model, numbers, float(spans.durations[member]))
+                if valid_angles(model, numbers) is None:
+                    break
+                locks = locks or timeline.is_free(model.manifest)
+            except RequestError as fault:
+                members.refused[member] = str(fault)
+    return locks

@@ -21,7 +21,6 @@ from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.distributions import NOISE, Distribution, stream
 from ballpass.runtime.many.spall_entries import driven_spalls, entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.cuts import entering_times
 from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
 from ballpass.runtime.quantity.quantity_run import QuantityRun
@@ -192,7 +191,6 @@ def make_signals(
         model = models[member.kind]
         try:
             numbers = model.numbers(member.parameters)
-            check_assembly(model, numbers)
             found = simulate(model, numbers, Request(times=times, outputs=signals.outputs, rtol=signals.rtol)).outputs
             if signals.quantities:
                 run = _recorded(model, numbers, signals)

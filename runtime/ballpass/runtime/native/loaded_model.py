@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
@@ -53,6 +53,7 @@ class LoadedModel(CompiledFunctions):
     ) -> None:
         super().__init__(folder, manifest, library, compiler)
         self._drivers: dict[DriverSources, Stepper | EnsembleDriver] = {}
+        self.valid_angles: tuple[bytes, Any] | None = None  # of the parameters asked for last, see request/assembly.py
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"

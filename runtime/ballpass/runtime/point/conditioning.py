@@ -20,6 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.request.assembly import angles_reached
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN, past
 
@@ -67,8 +68,8 @@ def has_reactions(model: LoadedModel) -> bool:
     return model.manifest.mechanism is not None and model.has(FUNCTION)
 
 
-def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
-    """Condition numbers over a turn; where nothing turns, at the given position.
+def conditioning(model: LoadedModel, numbers: Numbers, end: float = math.inf) -> Conditioning:
+    """Condition numbers over the angles that the driver reaches up to a time [s], by default a turn.
 
     Warns
     -----
@@ -76,7 +77,9 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
         The scaled condition number passes `BOUND`; names the crank angle.
     """
     manifest, kernel = model.manifest, model.kernel(FUNCTION)
-    moves = timeline.is_free(manifest) or timeline.driver(manifest, numbers.values).fastest > 0.0
+    low, high = angles_reached(model, numbers, end)
+    count = ANGLES * max(round((high - low) / TURN), 1)  # gears repeat after several turns
+    step = (high - low) / count
 
     def matrices(angles: np.ndarray) -> np.ndarray:
         """At angles past the start angle."""
@@ -84,17 +87,17 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
         fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
         return np.array([kernel({**fixed, **{n: rows[k] for n, rows in at.items()}}) for k in range(len(angles))])
 
-    turns = 1 if manifest.mechanism is None else manifest.mechanism.repeats
-    angles = TURN * np.arange(ANGLES * turns) / ANGLES if moves else np.zeros(1)
+    angles = low + step * np.arange(count if step else 1)
     sampled, found = matrices(angles), []
     for condition in (_condition, lambda m: _condition(equilibrate(m))):
         values = condition(sampled)
         k = int(np.argmax(values))
         angle, largest = float(angles[k]), float(values[k])
-        if moves and math.isfinite(largest):
-            reach = TURN / ANGLES
+        if step and math.isfinite(largest):
+            reach = step
             for _ in range(SWEEPS):
                 near = angle + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+                near = near if count > ANGLES or high - low == TURN else near.clip(low, high)
                 values = condition(matrices(near))
                 k = int(np.argmax(values))
                 angle, largest, reach = float(near[k]), float(values[k]), reach / FINE

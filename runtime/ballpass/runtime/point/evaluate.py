@@ -9,7 +9,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembled
+from ballpass.runtime.request.assembly import check_assembled
 from ballpass.runtime.request.request import no_output
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import MOST_TIME

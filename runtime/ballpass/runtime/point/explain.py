@@ -20,7 +20,6 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.equilibrium import held_coordinates, static_equilibrium
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
@@ -30,6 +29,7 @@ from ballpass.runtime.ratings.of_bearing import fit_clearances
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.request.assembly import check_assembly
 from ballpass.runtime.request.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
 from ballpass.runtime.time import timeline
@@ -202,7 +202,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         Unknown parameters, or a linkage that cannot be assembled.
     """
     numbers = model.numbers(parameters)
-    check_assembly(model, numbers)
+    check_assembly(model, numbers, 0.0)
     values = numbers.values
     manifest = model.manifest
     repetition = Repetition.of(manifest, values)

@@ -13,11 +13,11 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
 from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.point.slopes import jacobian
+from ballpass.runtime.request.assembly import check_assembly
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.breakpoints import breakpoints
 
@@ -151,7 +151,7 @@ class PointModel(LoadedModel):
         >>> model.check_assembly({"mechanism.bodies.crank.points.B": 0.5})
         Traceback (most recent call last):
             ...
-        RequestError: The linkage cannot be assembled at joint 'C', worst at crank angle 0.00 deg ...
+        RequestError: The linkage cannot be assembled at joint 'C' at crank angle 0.00 deg, where it starts ...
         """
         check_assembly(self, self.numbers(parameters))
 

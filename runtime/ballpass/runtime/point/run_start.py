@@ -1,8 +1,8 @@
-"""The start of a run of a model: numbers with which the linkage can be assembled, and a state."""
+"""The state at which a run of a model starts, from what is given for it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -10,24 +10,10 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.request.start import RunEnd, Start
 
 #: State at the start: given, "equilibrium", or the end of a run that this one continues; None takes the scene's.
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
-
-
-def run_numbers(model: LoadedModel, parameters: Mapping[str, float] | None) -> Numbers:
-    """Numbers of a run.
-
-    Raises
-    ------
-    RequestError
-        Unknown names, values out of bounds, or a linkage that cannot be assembled.
-    """
-    numbers = model.numbers(parameters)
-    check_assembly(model, numbers)
-    return numbers
 
 
 def start_of(model: LoadedModel, numbers: Numbers, initial: Initial) -> Start:

@@ -70,9 +70,8 @@ def checked_jacobian(
     """
     from ballpass.runtime.certify.jacobian_check import checked_jacobian
     from ballpass.runtime.point.equilibrium import instant, static_equilibrium
-    from ballpass.runtime.point.run_start import run_numbers
 
-    numbers = run_numbers(model, parameters)
+    numbers = model.numbers(parameters)
     time = instant(model, numbers, t, crank_angle)
     x = static_equilibrium(model, numbers, t=time).x if model.manifest.bearings and state == "equilibrium" else None
     return checked_jacobian(model, numbers, of, wrt, t=time, x=x, check=check)

@@ -102,11 +102,11 @@ def life(
     '0.9, 225 million turns'
     """
     from ballpass.runtime.life.report import life_report
-    from ballpass.runtime.point.run_start import run_numbers, start_of
+    from ballpass.runtime.point.run_start import start_of
     from ballpass.runtime.ratings.life import of_table
     from ballpass.runtime.request.request import Request
 
-    numbers = run_numbers(model, parameters)
+    numbers = model.numbers(parameters)
     request = Request(
         cycles=cycles,
         transient_cycles=transient,

@@ -104,7 +104,6 @@ def sensitivity(
     '0.28 m/m, verified'
     """
     from ballpass.runtime.certify.sensitivity_query import answer, make_query
-    from ballpass.runtime.point.run_start import run_numbers
 
     query = make_query(
         model,
@@ -121,6 +120,6 @@ def sensitivity(
         agreement=agreement,
         progress=None,
     )
-    numbers = run_numbers(model, parameters)
+    numbers = model.numbers(parameters)
     with shown_steps("differentiating", progress) as tell:
         return answer(model, numbers, replace(query, progress=tell))

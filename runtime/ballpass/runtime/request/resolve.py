@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.request.assembly import check_assembly, may_lock
 from ballpass.runtime.request.choose_method import choose_method
 from ballpass.runtime.request.locating import Kinks, choose_kinks
 from ballpass.runtime.request.magnitudes import model_scales, stepper_magnitudes
@@ -128,11 +130,17 @@ def resolve(
     settings = model.manifest.run
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)
     span = asked_span(model, numbers, request) if span is None else span
+    check_assembly(model, numbers, span.end)
     initial = start_state(model, numbers, request.initial)
     stretch = timeline.stretch(model.manifest, numbers.values)
     looked_at = min(span.duration, SCALED_TURNS * stretch)
     magnitude = np.zeros(0)
     method, reason = choose_method(model, request.method or settings.method, stepper=stepper)
+    if method not in STEPPERS and may_lock(model, numbers):
+        raise RequestError(
+            f"method {method}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
+            "and only the project's own stepper finds when. Take --method stepper; it needs a C compiler."
+        )
     if method in STEPPERS:
         magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, stretch, span.begin)
     elif model.states:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
 from ballpass.runtime.report.numbers import rounded
+from ballpass.runtime.request.assembly import LOCKED
 from ballpass.runtime.request.ball_angles import ball_angles
 from ballpass.runtime.request.magnitudes import mass_matrix
 from ballpass.runtime.time import timeline
@@ -36,6 +37,7 @@ class FailureLocation:
     ball_angle : its angle, in [0, 2 pi) [rad]
     deflection : its deflection, Eq. (6); negative where no ball touches [m]
     element : kind of the rolling elements
+    locked : a sentence on the dyad that locks there; empty where none does
     """
 
     crank_angle: float
@@ -44,12 +46,13 @@ class FailureLocation:
     ball_angle: float
     deflection: float
     element: str = "ball"
+    locked: str = ""
 
     @property
     def words(self) -> str:
-        """A sentence on the ball; empty without one."""
-        if self.ball is None:
-            return ""
+        """A sentence on the dyad that locks, or else on the ball; empty without either."""
+        if self.ball is None or self.locked:
+            return self.locked
         if self.deflection <= 0.0:
             return element_words("No ball is in contact there.", [self.element])
         angle = math.degrees(self.ball_angle)
@@ -70,6 +73,7 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
     found = FailureLocation(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found
+    found = replace(found, locked=locked_words(model, numbers, time, state))
     at_balls = ball_angles(model, numbers, time, state)
     for bearing, turned, deflections in zip(
         manifest.bearings, at_balls, ball_deflections(model, numbers, time, state), strict=True
@@ -77,8 +81,8 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
         angles = past(turned)
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
-            found = FailureLocation(
-                crank_angle=crank,
+            found = replace(
+                found,
                 bearing=bearing.name,
                 ball=ball + 1,
                 ball_angle=float(angles[ball]),
@@ -86,6 +90,25 @@ def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.
                 element=bearing.element,
             )
     return found
+
+
+def locked_words(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> str:
+    """A sentence on the dyad that locks at a state, of shape (states,), or the range that ends; empty where neither."""
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.range and mechanism.angle:
+        turned = float(state[model.states.index(mechanism.angle)])
+        first, last = (numbers.values[name] for name in mechanism.range)
+        if not first <= turned <= last:
+            return f"The driver's range is from {math.degrees(first):.4f} to {math.degrees(last):.4f} deg."
+    if mechanism is None or not mechanism.margins:
+        return ""
+    u = timeline.inputs_at(model.manifest, numbers.values, time)
+    margins = model.kernel("assembly")({"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c})
+    k = int(np.argmin(margins))
+    if margins[k] > 10.0 * LOCKED:
+        return ""
+    info = mechanism.margins[k]
+    return f"Joint {info.joint!r} locks ({info.description}: margin {margins[k]:.2g})."
 
 
 def ball_deflections(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> list[np.ndarray]:

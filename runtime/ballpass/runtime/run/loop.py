@@ -24,9 +24,11 @@ from ballpass.runtime.contract.plausible_ranges import UnusualWarning
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.reduction_rows import HEAD, void_moment
 from ballpass.runtime.native.stepper import End, Outcome, Segments, Stepper
+from ballpass.runtime.request.assembly import may_lock
 from ballpass.runtime.request.locating import LOCATED, stepper_for
 from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.request.segments import SEGMENTS_A_CALL, joined_segments, rest_of, run_windows
+from ballpass.runtime.run.driver_stops import driver_stop
 from ballpass.runtime.run.failure_location import FailureLocation, locate_failure, stall_words
 from ballpass.runtime.run.limits import allowance
 
@@ -61,7 +63,7 @@ class RunFailed(SimulationError):
         self, end: End, time: float, step: float, state: np.ndarray, place: FailureLocation, detail: str
     ) -> None:
         self.end, self.time, self.step, self.state, self.place, self.detail = end, time, step, state, place, detail
-        self.status = STATUS_OF_END[end]
+        self.status = Status.LOCKED if place.locked and end is not End.VOID else STATUS_OF_END[end]
         angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg"
         super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}. {detail} {place.words}".rstrip())
 
@@ -224,6 +226,10 @@ class RunUnderWay:
         run, until = self.run, self.run.end if until is None else until
         directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
         stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
+        watched = next((sink for sink in self.sinks if isinstance(sink, KeptSteps)), None)
+        if watched is None and may_lock(run.model, run.numbers):
+            watched = KeptSteps(numbers=stepper.kept)
+        sinks = self.sinks if watched is None or watched in self.sinks else (*self.sinks, watched)
         allowed = allowance(until - run.begin, run.stretch, self.time, self.steps + self.rejected)
         windows: Iterable[Segments] = (self.segments,) if self.segments is not None else ()
         if self.segments is None or (self.time, until) != (run.begin, run.end):
@@ -233,7 +239,7 @@ class RunUnderWay:
             held, taken, first_step = (stepper.hold() if directions is None else None), 0, 0.0
             goes_on = False
             while True:
-                arguments = {key: value for sink in self.sinks for key, value in sink.arguments(left, goes_on).items()}
+                arguments = {key: value for sink in sinks for key, value in sink.arguments(left, goes_on).items()}
                 arguments.setdefault("output_times", np.zeros(0))
                 arguments.setdefault("output_states", None)
                 more = min(STEPS_A_CALL, allowed.left)
@@ -249,7 +255,7 @@ class RunUnderWay:
                     first_step=first_step,
                     **arguments,
                 )
-                for sink in self.sinks:
+                for sink in sinks:
                     sink.take(outcome)
                 before = taken if held is not None else 0  # with `held` an outcome counts those of all its calls
                 taken = outcome.steps + outcome.rejected
@@ -258,6 +264,7 @@ class RunUnderWay:
                 gives_up = allowed.spend(taken - before, outcome.time)
                 if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
                     self._count(outcome)
+                    self._refuse_stop(stepper, watched)
                     raise self._failure(outcome, directions)
                 if run.progress is not None:
                     run.progress((outcome.time - run.begin) / (until - run.begin))
@@ -277,7 +284,15 @@ class RunUnderWay:
                         break
                     left, first_step = rest, outcome.step
         self.time = until
+        self._refuse_stop(stepper, watched)
         self._refuse_void()
+
+    def _refuse_stop(self, stepper: Stepper, watched: KeptSteps | None) -> None:
+        """Refuse a run whose driver came to where the linkage locks."""
+        stop = None if watched is None else driver_stop(self.run, stepper, watched.all)
+        if stop is not None:
+            place = locate_failure(self.run.model, self.run.numbers, *stop)
+            raise RunFailed(End.STEP_TOO_SMALL, stop[0], 0.0, stop[1], place, "The driver does not go on there.")
 
     def _refuse_void(self) -> None:
         """Refuse results in which a ball is flattened as none can be, at the moment where it is most.

@@ -100,8 +100,13 @@ def simulate(
         )
         for row in rows
     )
-    if failure is not None and failure.status is Status.VOID:
+    if failure is not None and failure.status in (Status.VOID, Status.LOCKED):
         trajectory.finished = int(np.searchsorted(trajectory.t[: trajectory.finished], failure.time, side="right"))
+    status = Status.DONE
+    if failure is not None:
+        state = failure.state if isinstance(failure, RunFailed) else last
+        place = locate_failure(model, numbers, failure.time, state)
+        status = Status.LOCKED if place.locked and failure.status is not Status.VOID else failure.status
     done = trajectory.finished
     solution = Solution(
         t=trajectory.t[:done],
@@ -113,16 +118,14 @@ def simulate(
         transient_cycles=run.span.transient,
         manifest=model.manifest,
         statistics=_statistics(run, trajectory, going, clocks.perf_counter() - started),
-        status=Status.DONE if failure is None else failure.status,
+        status=status,
         model=model,
         reductions=joined(before, counted),
         steady_reductions=counted,
     )
     if failure is not None:
-        state = failure.state if isinstance(failure, RunFailed) else last
-        place = locate_failure(model, numbers, failure.time, state)
         raise IntegrationError(
-            failure.status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
+            status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
         )
     return solution
 

@@ -214,6 +214,11 @@ class Turning:
         inner = self.begin[(begin < self.begin) & (self.begin < end)]
         return float(np.max(np.abs(self.at(np.concatenate([[begin], inner, [end]]))[1])))
 
+    def swept(self, begin: float, end: float) -> tuple[float, float]:
+        """Least and largest angle in a span [rad]."""
+        places = self.at(self._edges(begin, end))[0].real
+        return float(places.min()), float(places.max())
+
     @property
     def fastest(self) -> float:
         """Largest rate, in either sense [rad/s]."""

@@ -334,7 +334,7 @@ def load_model(
 
     Parameters
     ----------
-    asked : of the scene; numbers of ``--set`` are refused where the linkage locks with them
+    asked : of the scene
     needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
         derived; empty for others.  A scene without states needs no stepper
     inspect : see `read_own`: refuses names that the model does not have
@@ -352,8 +352,6 @@ def load_model(
         return load_own(folder) if own else load(folder)
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
-    if any(path.startswith("mechanism.") for path in asked.overrides):
-        model.check_assembly(asked.overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol
@@ -378,6 +376,11 @@ def speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
 
     mechanism = read_scene(scene).mechanism
     assert mechanism is not None
+    if mechanism.driver.swing is not None:
+        raise RequestError(
+            "What is written integrates the driver's motion, by a speed that changes, and this driver swings. Allowed: "
+            "a scene with a bearing, or whose driver turns. Its numbers as samples: ballpass run, ballpass stream."
+        )
     speed = f"{mechanism.driver.speed.value!r} rad/s"
     table = {"time": ["0 s", "1 s"], "speed": [speed, speed]}
     # states of a duty cycle may set the speed by its old name, and are for lives alone

@@ -362,7 +362,7 @@ void ballpass_reduce(ballpass *s, double *row) { s->reduction = row; }
 
 void ballpass_put(ballpass *s, int place, double value) { s->run.values[place] = value; }
 
-/* Values; derived constants; tables; the linkage. */
+/* Values; derived constants; tables. */
 static void check_values(ballpass *s)
 {
     double *values = s->run.values;
@@ -377,9 +377,6 @@ static void check_values(ballpass *s)
         }
     if (schedule_fault(&scene_schedule, values))
         refuse(s, "table", "a knot that is not after the one before", "knots that increase, angles within a turn.");
-#ifdef SCENE_LINKAGE
-    if (!s->faults.count) refuse_unassembled(values, time_of_turn(values), &s->faults);
-#endif
 }
 
 int ballpass_start(ballpass *s, const ballpass_request *request)
@@ -391,6 +388,9 @@ int ballpass_start(ballpass *s, const ballpass_request *request)
     if (s->faults.count) return BALLPASS_REFUSED;
     r->asked = request ? *request : ballpass_default(s);
     check_request(s, &r->asked);
+#ifdef SCENE_LINKAGE
+    if (!s->faults.count) refuse_unassembled(r->values, time_of_turn(r->values), r->asked.end, &s->faults);
+#endif
     if (s->faults.count) return BALLPASS_REFUSED;
     if (r->asked.located < 0)
         r->asked.located = r->asked.rtol <= SCENE_TIGHT && (r->asked.method == BALLPASS_AUTO || SCENE_TIGHT >= 1.0);

@@ -107,6 +107,11 @@ def _of_changing_speed(view: View, quantity: Quantity) -> Estimate:
 
 
 def _check(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
+    if manifest.mechanism is not None and manifest.mechanism.swing:
+        raise RequestError(
+            f"{quantity.name}: the driver swings and makes no turn. Ask for mean:drive_power, times the period of the "
+            "swing."
+        )
     if is_free(manifest):
         raise RequestError(
             f"{quantity.name}: a torque drives this scene, and its turns are not alike. Ask for mean:drive_power, "
