@@ -256,7 +256,12 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
     axis = rigid_shaft(bearings, scene.shaft, mechanism)
     if mechanism is None:
         turning = with_driver(drive)
-        on_shaft = (STILL, turning) if scene.shaft is not None and scene.shaft.ring == "outer" else (turning, STILL)
+        on_shaft = (turning, STILL)
+        if scene.shaft is not None and scene.shaft.ring == "outer":
+            on_shaft = (STILL, turning)
+        elif scene.shaft is not None and scene.shaft.outer_speed is not None:
+            outer = symbol_of(scene.shaft.outer_speed)
+            on_shaft = (turning, Swing(turns=outer / symbol_of(scene.shaft.speed), rate=outer))
         rings = [on_shaft] * len(bearings)
     else:
         linked = _linked(scene, mechanism, drive, axis, errors)

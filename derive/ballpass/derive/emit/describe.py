@@ -124,7 +124,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             joint=bearing.joint or "",
             inner_body=bearing.inner_body or driven if bearing.joint is not None else "",
             ring_speed=f"{bearing.path}.ring_speed"
-            if bearing.coupling == "two-way"
+            if bearing.coupling == "two-way" or (scene.shaft is not None and scene.shaft.outer_speed is not None)
             else speed.path
             if speed is not None
             else "",

@@ -48,6 +48,15 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
     for bearing in scene.bearings:
         _check_bearing(checker, bearing)
     _check_run(checker, scene)
+    shaft = scene.shaft
+    if shaft is not None and shaft.outer_speed is not None and shaft.speed.value == 0.0:
+        checker.fault(
+            shaft.speed.path,
+            "the inner ring stands, and angles count in its turns",
+            checker.show(shaft.speed),
+            "a speed other than zero where both rings turn",
+            'write ring = "outer" and the outer ring\'s speed as speed',
+        )
     return checker.faults
 
 

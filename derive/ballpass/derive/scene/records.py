@@ -355,8 +355,9 @@ _TILTING = (Needs(key="transverse_inertia", why="only a shaft that tilts in its 
 class Shaft:
     """Rotation of a ring where no mechanism gives it: constant speed [rad/s].  The other ring stands.
 
-    With `transverse_inertia` [kg*m^2] it is a rigid body that tilts in its bearings, of a `mass` [kg] and a
-    `polar_inertia` [kg*m^2], with its `center_of_mass` at a place along it [m]; without, these are None.
+    With `outer_speed` [rad/s] both rings turn.  With `transverse_inertia` [kg*m^2] it is a rigid body that tilts in its
+    bearings, of a `mass` [kg] and a `polar_inertia` [kg*m^2], with its `center_of_mass` at a place along it [m];
+    without, these are None.
     """
 
     speed: SceneNumber = quantity(
@@ -372,6 +373,15 @@ class Shaft:
         default="inner",
         note="loads act on the inner ring, also where it stands",
     ).declared()
+    outer_speed: SceneNumber | None = quantity(
+        "rad/s",
+        "Speed of the outer ring",
+        r"\omega_o",
+        "-800 rpm",
+        optional=True,
+        needs=(Needs(key="ring", value="inner", why="both rings turn, each at a speed of its own"),),
+        note="where both rings turn, as between two shafts or in a planet; without it the other ring stands",
+    )
     transverse_inertia: SceneNumber | None = positive(
         "kg*m^2",
         "Moment of inertia of the shaft about axes across it through its centre of mass",

@@ -29,7 +29,7 @@ def speed_name(manifest: Manifest) -> str | None:
     """Parameter or constant that holds the speed of driver or shaft; None when the model has neither."""
     if manifest.mechanism is not None:
         return manifest.mechanism.speed
-    return None if manifest.bearing is None else manifest.bearing.ring_speed
+    return None if manifest.bearing is None else "shaft.speed"
 
 
 def shaft_speed(manifest: Manifest, values: Values) -> float:
