@@ -161,7 +161,7 @@ def test_progress_is_one_plain_line_a_stage_where_stderr_is_a_file(site: Site, n
 
 
 def test_results_are_the_files_that_were_promised(site: Site) -> None:
-    pictures = {f"{name}.png" for name in figures.NAMES}
+    pictures = {f"{name}.png" for name in figures.NAMES if name != "shaft_loads"}  # bearings have no places
     folder = site.folder / "results" / "punching_press"
     assert {path.name for path in folder.glob("[!.]*")} == {"solution.nc", "summary.json", figures.CAPTIONS} | pictures
     assert sorted(path.name for path in (site.folder / "results").iterdir()) == sorted(NAMES)
