@@ -71,11 +71,20 @@ table = { time = ["0.1 s", "0.5 s", "1 s"], speed = ["100 rpm", "600 rpm", "-300
 """
 
 
-#: The crank tilts; its pin and its centre of mass have places of their own.
+#: The crank tilts; its pin, its centre of mass and the end of a spring have places of their own.
 TILTING = (
-    "[mechanism.bodies.crank]\n",
-    '[mechanism.bodies.crank]\ntransverse_inertia = "900 kg*mm^2"\n'
-    'positions = { B = "-12 mm", center_of_mass = "20 mm" }\n',
+    (
+        "[mechanism.bodies.crank]\n",
+        '[mechanism.bodies.crank]\ntransverse_inertia = "900 kg*mm^2"\n'
+        'positions = { B = "-12 mm", center_of_mass = "20 mm", P = "70 mm" }\n',
+    ),
+    ('points = { A = "origin", B = "6 mm" }', 'points = { A = "origin", B = "6 mm", P = ["3 mm", "15 mm"] }'),
+    (FRAME_POINTS, f'{FRAME_POINTS}\nhook = ["150 mm", "80 mm"]'),
+    (
+        "[mechanism.driver]\n",
+        '[mechanism.springs.it]\nbodies = ["frame", "crank"]\npoints = ["hook", "P"]\nstiffness = "2e5 N/m"\n'
+        'free_length = "150 mm"\ndamping = "40 N*s/m"\npreload = "20 N"\n[mechanism.driver]\n',
+    ),
 )
 
 
@@ -124,7 +133,7 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     ),
     "press, crank that tilts in three bearings": (
         "punching_press",
-        (TILTING, *OFF_CENTRE),
+        (*TILTING, *OFF_CENTRE),
         (
             bearing("A", elastic=True, count=2, position="30 mm"),
             bearing("A", position="90 mm", beside="second_", effects=EFFECTS),
@@ -134,7 +143,7 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     ),
     "press, overhung crank that tilts, motor": (
         "punching_press",
-        (TILTING, *OFF_CENTRE, *driven_by(MOTOR)),
+        (*TILTING, *OFF_CENTRE, *driven_by(MOTOR)),
         (bearing("A", position="40 mm"), bearing("A", elastic=True, position="100 mm", beside="second_")),
     ),
     "press, effects, motor": (
