@@ -58,21 +58,34 @@ class KeptParts:
         key : what decides this part beside that of all
         what : name of the part, where there are several of one key
         """
+        found = self.read(key, what)
+        return self.write(key, compute(), what) if found is None else found
+
+    def read(self, key: np.ndarray, what: str = "") -> Arrays | None:
+        """Arrays of a part from its file; None where there is none, or where it was cut, emptied or overwritten."""
         if self._folder is None:
-            return compute()
-        name = _digest((self._digest, what, key))
-        path = self._folder / f"{name}{ENDING}"
-        self.used.add(name)
+            return None
+        name, path = self._place(key, what)
         content = path.read_bytes() if path.exists() else b""
         written, seal = content[:-SEAL], content[-SEAL:]
-        if seal == _seal(name, written):  # else cut, emptied or overwritten: made again
-            with np.load(io.BytesIO(written)) as stored:
-                return tuple(stored[f"arr_{k}"] for k in range(len(stored.files)))
-        found = compute()
-        stream = io.BytesIO()
-        np.savez(stream, *found)
-        replace_file(path, stream.getvalue() + _seal(name, stream.getvalue()))
+        if seal != _seal(name, written):
+            return None
+        with np.load(io.BytesIO(written)) as stored:
+            return tuple(stored[f"arr_{k}"] for k in range(len(stored.files)))
+
+    def write(self, key: np.ndarray, found: Arrays, what: str = "") -> Arrays:
+        """Keep arrays of a part."""
+        if self._folder is not None:
+            (name, path), stream = self._place(key, what), io.BytesIO()
+            np.savez(stream, *found)
+            replace_file(path, stream.getvalue() + _seal(name, stream.getvalue()))
         return found
+
+    def _place(self, key: np.ndarray, what: str) -> tuple[str, Path]:
+        assert self._folder is not None
+        name = _digest((self._digest, what, key))
+        self.used.add(name)
+        return name, self._folder / f"{name}{ENDING}"
 
 
 @contextmanager

@@ -81,6 +81,7 @@ class Work:
     end : states of all members, at the start and then at the end, shape (members, states)
     rows : reductions of all members, shape (members, .)
     reducing : whether any channel is reduced
+    magnitude : of the states, shape (members, states); None: as their own runs have them
     results : members without results
     counts : of `COUNTS`, over all members
     stop : asks the threads to end soon when it becomes nonzero
@@ -100,10 +101,11 @@ class Work:
     results: dict[int, MemberFailure]
     counts: dict[str, int]
     stop: ctypes.c_int
+    magnitude: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Chunk:
+class Chunk:
     """Some members, their places in the table, and the times they have reached [s]; each of shape (members,)."""
 
     members: np.ndarray
@@ -132,13 +134,13 @@ def run_chunks(
     whether the user interrupted
     """
     durations, reached = work.span.durations[able], np.zeros(len(able))
-    chunks = [_Chunk(members=able[k : k + size], reached=reached[k : k + size]) for k in range(0, len(able), size)]
+    chunks = [Chunk(members=able[k : k + size], reached=reached[k : k + size]) for k in range(0, len(able), size)]
     interrupted = False
-    pending: dict[Future[dict[str, int]], _Chunk] = {}
+    pending: dict[Future[dict[str, int]], Chunk] = {}
     with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="ballpass") as pool:
         try:
             for chunk in chunks:
-                pending[pool.submit(_in_lanes if work.lanes else _one_by_one, work, chunk)] = chunk
+                pending[pool.submit(in_lanes if work.lanes else _one_by_one, work, chunk)] = chunk
             while pending:
                 # with a limit: without one, an interrupt does not end the wait of the main thread on every system
                 finished, _ = wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED)
@@ -173,8 +175,10 @@ def note_failure(work: Work, member: int, status: str, message: str, time: float
     work.results[member] = MemberFailure(member=member, status=status, time=time, message=message)
 
 
-def _magnitudes(work: Work, which: np.ndarray) -> np.ndarray:
+def magnitudes(work: Work, which: np.ndarray) -> np.ndarray:
     """Magnitudes of the states of some members, shape (members, states)."""
+    if work.magnitude is not None:
+        return np.asarray(work.magnitude[which])
     if work.driver is None:
         return np.zeros((len(which), 0))
     numbers = MemberNumbers(p=work.members.p[which], c=work.members.c[which])
@@ -200,15 +204,15 @@ def member_run(work: Work, member: int, magnitude: np.ndarray | None = None) -> 
         method=work.method,
         rtol=work.rtol,
         kinks=work.kinks,
-        magnitude=_magnitudes(work, np.array([member]))[0] if magnitude is None else magnitude,
+        magnitude=magnitudes(work, np.array([member]))[0] if magnitude is None else magnitude,
     )
 
 
-def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
+def in_lanes(work: Work, chunk: Chunk) -> dict[str, int]:
     """Integrate a chunk's members, several together; one that takes too many steps continues alone."""
     which, driver = chunk.members, work.driver
     assert driver is not None  # there are states
-    magnitude = _magnitudes(work, which)
+    magnitude = magnitudes(work, which)
     x = work.members.initial[which]
     rows = work.rows[which] if work.reducing else None
     durations = work.span.durations[which]
@@ -259,9 +263,9 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
     return counts
 
 
-def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
+def _one_by_one(work: Work, chunk: Chunk) -> dict[str, int]:
     """Integrate a chunk's members by the driver of single runs."""
-    magnitude = _magnitudes(work, chunk.members)
+    magnitude = magnitudes(work, chunk.members)
     counts = dict.fromkeys(COUNTS, 0)
     for place in range(len(chunk.members)):
         if work.stop.value:
@@ -272,7 +276,7 @@ def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
 
 
 def _alone(
-    work: Work, chunk: _Chunk, place: int, magnitude: np.ndarray, counts: dict[str, int], begun: np.void | None = None
+    work: Work, chunk: Chunk, place: int, magnitude: np.ndarray, counts: dict[str, int], begun: np.void | None = None
 ) -> None:
     """Integrate one member of a chunk by the driver of single runs, from where it is; adds its steps to `counts`.
 

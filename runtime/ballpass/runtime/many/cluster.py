@@ -18,7 +18,7 @@ import shutil
 import socket
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import islice
@@ -131,13 +131,22 @@ def _sent(client: Any, packed: Sequence[Packed]) -> Iterator[None]:
             client.unregister_worker_plugin(Sending.name)
 
 
+def refuse_other_clients(client: Any) -> None:
+    """Refuse what is no client, before anything is computed."""
+    if not hasattr(client, "nthreads"):
+        raise RequestError(
+            f"client: a Client of dask.distributed is expected, not {client!r:.60} ({type(client).__name__}). "
+            "Example: client=dask.distributed.Client(cluster)."
+        )
+
+
 def run_tasks(
     client: Any,
     models: Sequence[LoadedModel],
     function: Callable[..., Any],
     tasks: Callable[[Sequence[str]], Iterable[tuple[Any, ...]]],
     kept: str,
-) -> Iterator[Any]:
+) -> Generator[Any]:
     """Results of `function` for the tasks, in the order in which they end; a few run at a time.
 
     Parameters

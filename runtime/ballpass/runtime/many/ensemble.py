@@ -231,7 +231,7 @@ def simulate_many(
     chosen_method, _ = choose_method(model, method or manifest.run.method, stepper=True)
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
     at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance, lanes=True)
-    workers = _threads(threads)
+    workers = thread_count(threads)
     # the table first: a wrong one is reported before the driver is compiled
     columns = read_table(manifest, table)
     count = max((len(values) for values in columns.values()), default=0)
@@ -328,7 +328,8 @@ def _reduced(runs: ReducedRuns, quantity: Quantity) -> np.ndarray:
     return reduced(runs, quantity)
 
 
-def _threads(given: int | None) -> int:
+def thread_count(given: int | None) -> int:
+    """Threads that were asked for; None: as many as processors."""
     if given is None:
         # processors that this process may use, where the system reports them
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

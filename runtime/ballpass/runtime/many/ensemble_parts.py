@@ -15,7 +15,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.many.chunks import CHUNK, COUNTS, MemberFailure
-from ballpass.runtime.many.cluster import loaded, run_tasks
+from ballpass.runtime.many.cluster import loaded, refuse_other_clients, run_tasks
 from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics, simulate_many
 from ballpass.runtime.many.members import Table, read_table
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -46,11 +46,7 @@ def simulate_parts(
     options : of `ballpass.runtime.many.ensemble.simulate_many`, except threads: the cluster has its own
     """
     started = clocks.perf_counter()
-    if not hasattr(client, "nthreads"):
-        raise RequestError(
-            f"client: a Client of dask.distributed is expected, not {client!r:.60} ({type(client).__name__}). "
-            "Example: client=dask.distributed.Client(cluster)."
-        )
+    refuse_other_clients(client)
     manifest = model.manifest
     columns = read_table(manifest, table)
     count = len(next(iter(columns.values())))

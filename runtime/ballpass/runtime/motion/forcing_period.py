@@ -10,9 +10,10 @@ seen from the accelerations at one state, now and a period later.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
@@ -158,10 +159,10 @@ def forcing_period(
 def common_period(
     model: LoadedModel,
     parameters: Mapping[str, float],
-    over: ParameterRange,
+    over: Sequence[ParameterRange],
     sampled: Callable[[Mapping[str, float]], Solution],
 ) -> ForcingPeriod:
-    """The shortest period of the equations that holds over a range of one parameter.
+    """The shortest period of the equations that holds over ranges of parameters, by their corners and a point within.
 
     Parameters
     ----------
@@ -171,18 +172,18 @@ def common_period(
     Raises
     ------
     RequestError
-        As for `forcing_period` at both ends, or no period holds between them.
+        As for `forcing_period` at all corners, or no period holds between them.
     """
-    shares = (0.0, 1.0, WITHIN_RANGE)
-    given = [{**parameters, over.name: over.at(share)} for share in shares]
+    shares = [*product((0.0, 1.0), repeat=len(over)), (WITHIN_RANGE,) * len(over)]
+    given = [{**parameters, **{one.name: one.at(at) for one, at in zip(over, each, strict=True)}} for each in shares]
     judged = [(model.numbers(one), run.t, run.x) for one in given for run in (sampled(one),)]
-    ends = [forcing_period(model, *one, None) for one in judged[:2]]
+    ends = [forcing_period(model, *one, None) for one in judged[:-1]]
     for found in ends:
         if all(_checked(model, *one, found).difference <= SAME for one in judged):
             return found
     raise RequestError(
-        f"{over.name}: at its first end {ends[0].words}, at its second {ends[1].words}: no period holds between. "
-        "Allowed: parameters that leave the ratio of the speeds as it is."
+        f"{' and '.join(one.name for one in over)}: at the first end {ends[0].words}, at the second {ends[-1].words}: "
+        "no period holds between. Allowed: parameters that leave the ratio of the speeds as it is."
     )
 
 

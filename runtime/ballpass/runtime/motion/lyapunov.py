@@ -48,6 +48,12 @@ CERTAIN = 2.0
 #: Half an interval about zero that is short enough to say that nothing grows, per reading [1].
 NARROW = 0.02
 
+#: What largest exponents are, for people.
+EXPONENT_WORDS = (
+    "Largest exponent, of Lyapunov: the logarithm of how much a small disturbance grows from one reading to the next. "
+    "Below zero it dies out; above zero the motion is chaotic."
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exponent:
@@ -74,6 +80,11 @@ class Exponent:
     def chaotic(self) -> bool:
         """Whether an interval of `CERTAIN` times its width lies above zero: growth on transients is not stationary."""
         return self.mean > CERTAIN * self.half
+
+    @property
+    def words(self) -> str:
+        """The number for people."""
+        return f"{self.mean:.3g} ± {self.half:.2g}"
 
 
 def largest_exponent(

@@ -1,6 +1,6 @@
 """When states are read stroboscopically, and the periodic state to which readings come.
 
-In: a model, a range of a parameter or none.  Out: `Strobe`.
+In: a model, ranges of parameters or none.  Out: `Strobe`.
 
 Readings are a period of the equations apart, or a turn where that is long or there is none: balls or loads are then
 elsewhere each time.
@@ -9,7 +9,7 @@ elsewhere each time.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -99,20 +99,13 @@ class Strobe:
             return None
         begun = Shooting(model=model, parameters=parameters, period=self.period, magnitude=magnitude, parts=parts)
         for period in range(1, repeats or min(LONGEST_SOUGHT, len(states) // 4) + 1):
-            changes = changes_after(states, magnitude, period)
-            third = max(len(changes) // 3, 1)
-            if repeats % period or (not repeats and not np.max(changes[-third:]) < FALLS * np.max(changes[:third])):
+            if not may_repeat(states, magnitude, repeats, period):
                 continue
             try:
                 found = replace(begun, repeats=period).solve(states[-1:])
             except SimulationError:
                 continue
-            away = np.max(np.abs((states[::-period] - found.nodes[0]) / magnitude), axis=1)[::-1]
-            third = max(len(away) // 3, 1)
-            size = abs(found.multipliers[0])
-            # between the middles of these thirds a disturbance falls by its power of two thirds of the readings
-            falls = max(REPEATED, size ** (len(away) / 3.0) * np.max(away[:third]))
-            if size < 1.0 and np.max(away[-third:]) <= falls:
+            if come_to(states, magnitude, period, found.nodes[0], abs(found.multipliers[0])):
                 return period, found.nodes[0]
         return None
 
@@ -171,23 +164,48 @@ class Strobe:
         return alike + step * np.arange(first, last + 1)[-READ:]
 
 
+def may_repeat(states: np.ndarray, magnitude: np.ndarray, repeats: int, period: int) -> bool:
+    """Whether a state that repeats after so many readings is worth a search: changes fall, or `repeats` is several.
+
+    Parameters
+    ----------
+    repeats : by `period_of`
+    """
+    changes = changes_after(states, magnitude, period)
+    third = max(len(changes) // 3, 1)
+    return repeats % period == 0 and bool(repeats or np.max(changes[-third:]) < FALLS * np.max(changes[:third]))
+
+
+def come_to(states: np.ndarray, magnitude: np.ndarray, period: int, state: np.ndarray, size: float) -> bool:
+    """Whether readings come to a state that repeats, as fast as its largest multiplier says.
+
+    Parameters
+    ----------
+    size : of that multiplier
+    """
+    away = np.max(np.abs((states[::-period] - state) / magnitude), axis=1)[::-1]
+    third = max(len(away) // 3, 1)
+    # between the middles of these thirds a disturbance falls by its power of two thirds of the readings
+    return size < 1.0 and bool(np.max(away[-third:]) <= max(REPEATED, size ** (len(away) / 3.0) * np.max(away[:third])))
+
+
 def strobe_of(
-    model: LoadedModel, parameters: Mapping[str, float], over: ParameterRange | None, question: str
+    model: LoadedModel, parameters: Mapping[str, float], over: Sequence[ParameterRange], question: str
 ) -> Strobe:
-    """When states are read, over a range of a parameter or for these numbers alone.
+    """When states are read, over ranges of parameters or for these numbers alone.
 
     Raises
     ------
     RequestError
         Nothing turns.
     """
-    first = parameters if over is None else {**parameters, over.name: over.low}
+    first = {**parameters, **{one.name: one.low for one in over}}
     values = model.numbers(first).values
     turn = timeline.driver(model.manifest, values).turn
     if not math.isfinite(turn):
         raise RequestError(f"{question}: nothing turns in this scene. Allowed: a driver or shaft that turns.")
     try:
-        if over is None:
+        if not over:
             run = sampled_turns(model, first)
             period = forcing_period(model, model.numbers(first), run.t, run.x, None)
         else:

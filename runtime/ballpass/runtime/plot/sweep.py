@@ -74,13 +74,13 @@ def _line(panel: Axes, varied: ParameterRange, values: np.ndarray) -> None:
     missing = ~np.isfinite(values)
     places = varied.shown[missing]
     panel.plot(places, np.full(places.size, 0.02), "x", transform=panel.get_xaxis_transform(), color=SIGNAL)
-    _scale(panel, "x", varied)
+    scale_axis(panel, "x", varied)
 
 
 def _map(panel: Axes, first: ParameterRange, second: ParameterRange, values: np.ndarray) -> Any:
     """The first parameter along x, the second along y."""
     shown = np.ma.masked_invalid(values.T)
-    mesh = panel.pcolormesh(_edges(first), _edges(second), shown, cmap=LUMINANCE, rasterized=True)
+    mesh = panel.pcolormesh(cell_edges(first), cell_edges(second), shown, cmap=LUMINANCE, rasterized=True)
     low, high = float(shown.min()), float(shown.max())
     if high - low > FLAT * max(abs(low), abs(high)) and min(shown.shape) > 1:
         levels = [level for level in MaxNLocator(CONTOURS).tick_values(low, high) if low < level < high]
@@ -93,12 +93,12 @@ def _map(panel: Axes, first: ParameterRange, second: ParameterRange, values: np.
     missing = np.ma.getmaskarray(shown)
     panel.plot(across[missing], up[missing], linestyle="none", marker="x", color=GREY)
     panel.grid(visible=False)
-    _scale(panel, "x", first)
-    _scale(panel, "y", second)
+    scale_axis(panel, "x", first)
+    scale_axis(panel, "y", second)
     return mesh
 
 
-def _edges(varied: ParameterRange) -> np.ndarray:
+def cell_edges(varied: ParameterRange) -> np.ndarray:
     """Borders of the cells around the values, shape (points + 1,)."""
     centres = np.log(varied.shown) if varied.logarithmic else varied.shown
     middle = 0.5 * (centres[1:] + centres[:-1])
@@ -106,7 +106,8 @@ def _edges(varied: ParameterRange) -> np.ndarray:
     return np.exp(edges) if varied.logarithmic else edges
 
 
-def _scale(panel: Axes, axis: str, varied: ParameterRange) -> None:
+def scale_axis(panel: Axes, axis: str, varied: ParameterRange) -> None:
+    """Label and scale of an axis along which a parameter varies."""
     panel.set(**{f"{axis}label": label(varied.words, varied.shown_unit)})
     if not varied.logarithmic:
         return

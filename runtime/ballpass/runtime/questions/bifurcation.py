@@ -1,19 +1,23 @@
-"""What kind of motion there is over a parameter: stroboscopic values up and down, and the largest Lyapunov exponent."""
+"""What kind of motion there is over a parameter: stroboscopic values up and down, and the largest Lyapunov exponent.
+
+Over two parameters: a map of kinds and exponents, each point from the scene's start.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.questions import option_names
@@ -26,9 +30,11 @@ from ballpass.runtime.show.short import ShortRepr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.kept_parts import Arrays
+    from ballpass.runtime.ask.kept_parts import Arrays, KeptParts
     from ballpass.runtime.ask.parameter_range import ParameterRange
     from ballpass.runtime.motion.lyapunov import Exponent
+    from ballpass.runtime.motion.motion_map import MotionMap
+    from ballpass.runtime.motion.strobe import Strobe
 
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
@@ -37,9 +43,9 @@ SAME = 1e-2
 PATIENCE = 0.2
 
 Vary = Annotated[
-    str,
+    str | Sequence[str],
     option_names.ranged(
-        "Parameter and its values; `:log` behind them for equal factors.",
+        "Parameter and its values; `:log` behind them for equal factors. Given twice: a map over both.",
         'bearing.clearance="5 um:40 um:80"',
         counted=True,
     ),
@@ -114,6 +120,8 @@ class Bifurcation(ShortRepr, Reported):
     apart: tuple[float, ...]
 
     def _report(self) -> Report:
+        from ballpass.runtime.motion.lyapunov import EXPONENT_WORDS
+
         unit, factor = printed_unit(self.vary.shown_unit), self.vary.factor
         rows = []
         for name, motions in (("up", self.up), ("down", self.down)):
@@ -130,10 +138,7 @@ class Bifurcation(ShortRepr, Reported):
         )
         said = []
         if shown == 4:
-            said.append(
-                "Largest exponent, of Lyapunov: the logarithm of how much a small disturbance grows from one reading "
-                "to the next. Below zero it dies out; above zero the motion is chaotic."
-            )
+            said.append(EXPONENT_WORDS)
         if self.apart:
             found = ", ".join(f"{value / factor:.6g}" for value in self.apart[:8])
             more = f" and {len(self.apart) - 8} more" if len(self.apart) > 8 else ""
@@ -174,18 +179,26 @@ def _span(exponents: list[Exponent]) -> str:
     if not exponents:
         return ""
     if len(exponents) == 1:
-        return f"{exponents[0].mean:.3g} ± {exponents[0].half:.2g}"
+        return exponents[0].words
     means = [one.mean for one in exponents]
     return f"{min(means):.3g} to {max(means):.3g}, ± {max(one.half for one in exponents):.2g} at most"
 
 
-def _figures(_model: AnyModel, found: Bifurcation, _parameters: object) -> Iterator[tuple[str, Figure]]:
+def _figures(_model: AnyModel, found: Bifurcation | MotionMap, _: object) -> Iterator[tuple[str, Figure]]:
     from ballpass.runtime.plot.bifurcation import draw_bifurcation
+    from ballpass.runtime.plot.motion_map import draw_map
 
-    yield "bifurcation", draw_bifurcation(found.vary, found.state, found.unit, found.row, found.up, found.down)
+    if isinstance(found, Bifurcation):
+        yield "bifurcation", draw_bifurcation(found.vary, found.state, found.unit, found.row, found.up, found.down)
+    else:
+        yield "bifurcation", draw_map(found.vary, found.kinds, found.exponent if found.exponents else None)
 
 
-@Question(figures=_figures, needs="scipy", requires="bearings")
+def _files(found: Bifurcation | MotionMap) -> Mapping[str, bytes]:
+    return {} if isinstance(found, Bifurcation) else {"bifurcation.nc": found.netcdf()}
+
+
+@Question(figures=_figures, files=_files, needs="scipy", requires="bearings")
 def bifurcation(
     model: AnyModel,
     vary: Vary,
@@ -197,25 +210,29 @@ def bifurcation(
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     keep: str | Path | None = None,
+    client: Any = None,
     progress: Progress = None,
-) -> Bifurcation:
+) -> Bifurcation | MotionMap:
     """Separate periodic from chaotic motion over a parameter, upwards and downwards.
 
     Each value begins where the motion at the value before ended, so that motions that exist side by side show as a
     difference between up and down. States are read once in a period of the equations, or once a turn where that is
     longer than eight turns.
 
+    Over two parameters the answer is a map: the points are independent of each other, each from the scene's start.
+
     Parameters
     ----------
     parameters : overrides, SI
     keep : folder for what is computed, by which a call that was killed continues; what it kept is deleted at the end
+    client : of `dask.distributed`, whose workers take points of a map; else threads do
     progress : as for `simulate`
 
     Raises
     ------
     RequestError
-        A wrong range or state, a scene in which nothing turns, one whose driver's motion is a state, or with
-        `exponent` a law whose force jumps.
+        A wrong range or state, a scene in which nothing turns, one whose driver's motion is a state, a map without a
+        common period, or with `exponent` a law whose force jumps.
     IntegrationError
         The computation failed.
 
@@ -230,31 +247,107 @@ def bifurcation(
     from ballpass.runtime.ask.kept_parts import kept_parts
     from ballpass.runtime.ask.parameter_range import parameter_range
     from ballpass.runtime.motion.forcing_period import refuse_free_driver
-    from ballpass.runtime.motion.lyapunov import kind_of_motion, largest_exponent
     from ballpass.runtime.motion.strobe import strobe_of
     from ballpass.runtime.request.locating import refuse_jumps
 
     manifest = model.manifest
     if exponent:
         refuse_jumps(manifest, "bifurcation with an exponent")
-    chosen = parameter_range(manifest.parameters, "vary", vary, counted=True)
-    names = [info.name for info in manifest.states]
-    state = of or ("inner.y" if "inner.y" in names else names[0])
+    texts = [vary] if isinstance(vary, str) else list(vary)
+    ranges = [parameter_range(manifest.parameters, "vary", text, counted=True) for text in texts]
+    if len({one.name for one in ranges}) != len(ranges) or len(ranges) not in (1, 2):
+        raise RequestError(
+            f"vary: {', '.join(one.name for one in ranges)} were given. Allowed: one parameter, or two that differ."
+        )
+    if len(ranges) == 2 and of is not None:
+        raise RequestError(f"of: a map shows no state, and {of} was given. Allowed: one parameter with it. Omit it.")
+    if len(ranges) == 1 and client is not None:
+        raise RequestError(
+            "client: over one parameter each value begins where the one before ended, which no cluster shortens. "
+            "Allowed: two parameters. Omit it."
+        )
     model.numbers(parameters)  # refuses what is no mapping, or names no parameter
     overrides = dict(parameters or {})
     refuse_free_driver(manifest, "bifurcation")
-    strobe = strobe_of(model, overrides, chosen, "bifurcation")
+    strobe = strobe_of(model, overrides, ranges, "bifurcation")
+    decides = (readings, settling, exponent, rtol, overrides)
+    if len(ranges) == 2:
+        with kept_parts(keep, model, "map", *ranges, *decides) as parts, shown("following motions", progress) as tell:
+            return _map(model, ranges, strobe, overrides, (readings, settling, rtol, exponent), parts, client, tell)
+    with kept_parts(keep, model, ranges[0], *decides) as parts, shown("following motions", progress) as tell:
+        return _followed(model, ranges[0], of, strobe, overrides, (readings, settling, rtol, exponent), parts, tell)
+
+
+def _map(
+    model: AnyModel,
+    ranges: Sequence[ParameterRange],
+    strobe: Strobe,
+    overrides: Mapping[str, float],
+    asked: tuple[int, int, float | None, bool],
+    parts: KeptParts,
+    client: Any,
+    tell: Callable[[float], None] | None,
+) -> MotionMap:
+    """Motions over a plane."""
+    from ballpass.runtime.motion.map_blocks import motions_in_blocks
+    from ballpass.runtime.motion.map_points import MapRequest
+    from ballpass.runtime.motion.motion_map import MotionMap
+    from ballpass.runtime.time.repetition import Repetition
+
+    first, second = ranges
+    readings, settling, rtol, exponent = asked
+    if strobe.period is None:
+        raise RequestError(
+            "bifurcation: a map needs readings after which the equations are the same, and here they are none within "
+            "eight turns. Allowed: diameters and speeds whose ratios are fractions of small numbers, as "
+            'bearing.pitch_diameter="31.75 mm" of a 6204, over the whole plane; or one parameter: one --vary.'
+        )
+    table = {name: np.full(first.count * second.count, value) for name, value in overrides.items()}
+    table[first.name] = np.repeat(first.values, second.count)
+    table[second.name] = np.tile(second.values, first.count)
+    corners = [{name: float(all_[k]) for name, all_ in table.items()} for k in (0, second.count - 1, -second.count, -1)]
+    begin = max(Repetition.of(model.manifest, model.numbers(corner).values).alike_from for corner in corners)
+    if begin > 0.0:
+        raise RequestError(
+            f"bifurcation: turns are alike from {begin:.6g} s on, and points of a map begin at t = 0. Allowed: "
+            "tables over time that end there; or one parameter: one --vary."
+        )
+    found = motions_in_blocks(
+        model,
+        table,
+        MapRequest(period=strobe.period, readings=readings, settling=settling, rtol=rtol, exponent=exponent),
+        parts,
+        client,
+        tell,
+    )
+    return MotionMap(
+        vary=(first, second), title=model.manifest.title, every=strobe.every, motions=found, exponents=exponent
+    )
+
+
+def _followed(
+    model: AnyModel,
+    chosen: ParameterRange,
+    of: str | None,
+    strobe: Strobe,
+    overrides: Mapping[str, float],
+    asked: tuple[int, int, float | None, bool],
+    parts: KeptParts,
+    tell: Callable[[float], None] | None,
+) -> Bifurcation:
+    """Motions over one parameter, upwards and downwards."""
+    from ballpass.runtime.motion.lyapunov import kind_of_motion, largest_exponent
+
+    manifest, (readings, settling, rtol, exponent) = model.manifest, asked
+    names = [info.name for info in manifest.states]
+    state = of or ("inner.y" if "inner.y" in names else names[0])
     stopped, done = Event(), [0]
 
     def each() -> None:
         if stopped.is_set():
             raise KeyboardInterrupt
 
-    with (
-        kept_parts(keep, model, chosen, readings, settling, exponent, rtol, overrides) as parts,
-        shown("following motions", progress) as tell,
-        ThreadPoolExecutor(2) as pool,
-    ):
+    with ThreadPoolExecutor(2) as pool:
 
         def motion(given: Mapping[str, float], begin: np.ndarray | None, dropped: int) -> Arrays:
             step = strobe.time(model, given)

@@ -41,6 +41,7 @@ class Question:
     samples : whether samples are enough, which other methods give without a compiler
     takes_runs : whether the solution of a run may stand in place of the model
     figures : of a model, an answer and overrides, by names of files
+    files : of an answer: further files for that folder, by their names
     steady : whether its numbers are those of the steady machine, so that what is not is warned of; where it finds
         parameters itself, a function of the answer that gives them
     requires : what a scene must have for an answer: ``"states"`` or ``"bearings"``; empty for nothing
@@ -57,6 +58,7 @@ class Question:
     samples: bool = False
     takes_runs: bool = False
     figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
+    files: Callable[[Any], Mapping[str, bytes]] | None = None
     requires: Literal["", "states", "bearings"] = ""
     digits: bool = False
     always: bool = False

@@ -240,7 +240,7 @@ def section(
     repetition = Repetition.of(manifest, numbers.values)
     turn, turns, alike = repetition.turn, repetition.turns, repetition.alike_from
     refuse_free_driver(manifest, "section")
-    strobe = strobe_of(model, given, None, "section")
+    strobe = strobe_of(model, given, (), "section")
     names = tuple(info.name for info in manifest.states)
     state = of or ("inner.y" if "inner.y" in names else names[0])
     angle = 0.0 if at is None else at

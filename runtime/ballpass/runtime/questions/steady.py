@@ -308,7 +308,7 @@ def steady(
         if ends is None or turns is not None:
             period = forcing_period(model, numbers, sampled.t, sampled.x, turns)
         else:
-            period = common_period(model, given, ends, sample)
+            period = common_period(model, given, [ends], sample)
         length = period.time(numbers.values)
         shooting = Shooting(
             model=model,

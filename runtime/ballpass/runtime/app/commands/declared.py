@@ -228,6 +228,9 @@ def _ask(
                 folder.mkdir(parents=True, exist_ok=True)
                 written = [folder / f"{question.name}.json"]
                 replace_file(written[0], json_text(plain).encode())
+            for name, content in (question.files(answer) if question.files else {}).items():
+                written.append(folder / name)
+                replace_file(written[-1], content)
             if formats and question.figures is not None:
                 from ballpass.runtime.plot.style import write_figures
 
@@ -307,7 +310,8 @@ def _place(
         formats = ()
     if folder is None or (question.always and not formats):
         return None, ()
-    check_folder(folder, f"{question.name}.json", f"{question.name}.md", *(f"*.{kind}" for kind in formats))
+    kinds = (*formats, *(("nc",) if question.files else ()))
+    check_folder(folder, f"{question.name}.json", f"{question.name}.md", *(f"*.{kind}" for kind in kinds))
     return folder, formats
 
 
