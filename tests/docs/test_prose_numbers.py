@@ -87,6 +87,7 @@ NAMED: dict[str, dict[str, str]] = {
         "−0.297, and +1.6 at 39.9 µm": "ADR 0032",
         "at 30 µm with 3/8": "31.75 mm in the block",
         "chaotic for some 1650 turns": "ADR 0032",
+        "ratio is 409/1072, has no short one; with 3/8, as above": "31.75 mm in the block; test_steady.py",
     },
     "docs/howto/steady.md": {
         "cage ratio of 409/1072, and repeats after 134 turns": "(1 - 7.9375/33.5)/2; test_steady.py",

@@ -77,7 +77,7 @@ def test_tangents_give_exponents_of_the_press_where_differences_sink_into_roundi
 ) -> None:
     press = make_model("punching_press_tangent")
     plane = ["bearing.clearance=10 um:39.9 um:2", "mechanism.driver.speed=500 rpm:501 rpm:2"]
-    found = press.bifurcation(plane, parameters=THREE_EIGHTHS, readings=30, settling=5)
+    found = press.bifurcation(plane, parameters=THREE_EIGHTHS, readings=20, settling=2)
     assert found.kinds[:, 0].tolist() == ["periodic 1", "chaotic"]
     assert found.exponent[0, 0] == pytest.approx(-9.893456, abs=1e-5)  # a small disturbance falls to e-5 in a turn
     line = press.bifurcation("bearing.clearance=39.9 um:40 um:2", parameters=THREE_EIGHTHS).up[0]
