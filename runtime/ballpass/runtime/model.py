@@ -102,15 +102,20 @@ def _loaded(folder: str | Path, compiler: str | None, read: Callable[[], Manifes
     return Model(place, manifest, library, compiler=compiler)
 
 
-def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
+def _load_same(folder: str, content: tuple[object, ...], compiler: str | None) -> Model:
     """A model from another process: loaded anew, if its folder is unchanged."""
     model = load(folder, compiler=compiler)
-    if model.manifest.signature != signature:
+    if _content(model.manifest) != content:
         raise ArtefactError(
             f"{folder}: another scene was generated here since the model was pickled. Allowed: the folder it was "
             "loaded from, unchanged. Load it and pickle it again."
         )
     return model
+
+
+def _content(manifest: Manifest) -> tuple[object, ...]:
+    """What is generated, whatever the numbers of its scene."""
+    return manifest.signature, manifest.files
 
 
 @typed_methods
@@ -143,8 +148,8 @@ class Model(PointModel, Questions):
 
             self.manifest = seated(self)
 
-    def __reduce__(self) -> tuple[Callable[[str, str, str | None], Model], tuple[str, str, str | None]]:
-        return _load_same, (str(self.folder), self.manifest.signature, self._compiler)
+    def __reduce__(self) -> tuple[Callable[..., Model], tuple[object, ...]]:
+        return _load_same, (str(self.folder), _content(self.manifest), self._compiler)
 
     @property
     def run_settings(self) -> RunInfo:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import duty_info, info_of, life_info, signature, versions
+from ballpass.derive.emit.signature import duty_info, info_of, life_info, plugins_of, signature, versions
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.mechanism.gear import GearPair
@@ -30,7 +30,7 @@ def describe(
         title=scene.title,
         source=source,
         signature=signature(scene),
-        versions=versions(),
+        versions=versions(plugins_of(scene)),
         parameters=tuple(
             info_of(mf.ParameterInfo, p, **(asdict(bounds[p.name]) if p.name in bounds else {}))
             for p in system.parameters

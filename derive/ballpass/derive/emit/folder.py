@@ -30,6 +30,7 @@ import casadi as ca
 from ballpass.derive.emit.describe import describe
 from ballpass.derive.emit.equations import equations
 from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header, switches_header, tangents_header
+from ballpass.derive.emit.signature import deriving_sources
 from ballpass.derive.lowering.functions import LoweredFunctions
 from ballpass.derive.lowering.jacobians import DERIVATIVES, Described
 from ballpass.derive.system import System
@@ -50,7 +51,7 @@ def write_folder(folder: Path, system: System, functions: LoweredFunctions, sour
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, file_digest(p)) for p in sorted(folder.iterdir()))
-    write_manifest(folder, describe(system, functions, source, files), own=True)
+    write_manifest(folder, describe(system, functions, source, files), made_by=deriving_sources())
 
 
 def _headers(system: System, functions: LoweredFunctions) -> dict[str, str]:

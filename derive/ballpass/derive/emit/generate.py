@@ -14,11 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballpass.derive.emit.signature import (
+    deriving_sources,
     duty_info,
     folder_of,
     fresh_manifest,
     info_of,
     life_info,
+    plugins_of,
     signature,
     source_key,
 )
@@ -155,7 +157,7 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderChe
 def _own_manifest(folder: Path, say: Callable[[str], None]) -> mf.Manifest | None:
     """The folder's manifest where its digests fit the files, and this user's ballpass wrote them."""
     try:
-        return intact_manifest(folder, own=True)
+        return intact_manifest(folder, own=True, made_by=deriving_sources())
     except ForeignFolderError:
         say(f"{folder} was not written by your ballpass: nothing of it is executed, it is derived anew")
     except ArtefactError:
@@ -169,7 +171,8 @@ def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
         return scene, ""
     from ballpass.derive.reading.read import read_scene
 
-    return read_scene(scene), source_key(Path(scene))
+    read = read_scene(scene)
+    return read, source_key(Path(scene), plugins_of(read))
 
 
 def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, LoweredFunctions]:
@@ -210,7 +213,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
 
         derive(scene)  # refuses a linkage that locks with its new numbers
     with locked(folder):
-        write_manifest(folder, updated, own=True)
+        write_manifest(folder, updated, made_by=deriving_sources())
 
 
 def _refuse_foreign(folder: Path) -> None:

@@ -1,7 +1,8 @@
 """The signature of a generated folder: what it was made from, to find whether it is up to date.
 
 Nothing here needs SymPy or CasADi, so that a fresh folder is found without waiting for them.  Numbers are not in the
-signature: a changed number rewrites the manifest's defaults and nothing else.
+signature: a changed number rewrites the manifest's defaults and nothing else.  Nor are the deriving sources, of which a
+change may change nothing in a folder: the user's cache notes by which of them a folder was written.
 """
 
 from __future__ import annotations
@@ -9,7 +10,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import tomllib
+import warnings
+from collections.abc import Iterable
 from dataclasses import fields
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -18,6 +22,7 @@ from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.folder import intact_manifest
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.plugins import PluginWarning, digest_of, modules_of
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
@@ -29,21 +34,25 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="DataclassInstance")
 
 
+#: Begin of the name of a plugin among the versions.
+_PLUGIN = "plugin "
+
+
 def signature(scene: Scene) -> str:
-    """Digest of everything but numbers that decides what is generated: structure, deriving sources, versions."""
-    text = repr((mf.SCHEMA, scene.structure(), _sources(), versions()))
+    """Digest of everything but numbers and ballpass's own code that decides what is generated: structure, versions."""
+    text = repr((mf.SCHEMA, scene.structure(), versions(plugins_of(scene))))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def source_key(path: Path) -> str:
-    """Digest of a scene file and the files it names, whatever ends of lines; of deriving sources and versions.
+def source_key(path: Path, plugins: Iterable[tuple[str, str]]) -> str:
+    """Digest of a scene file and the files it names, whatever ends of lines; of versions and plugins.
 
     Raises
     ------
     OSError
         The file cannot be read.
     """
-    digest = hashlib.sha256(repr((mf.SCHEMA, path.stem, _sources(), versions())).encode())
+    digest = hashlib.sha256(repr((mf.SCHEMA, path.stem, versions(plugins))).encode())
     text = read_file(path).replace(b"\r\n", b"\n")
     digest.update(text)
     if b"file" in text:
@@ -54,9 +63,44 @@ def source_key(path: Path) -> str:
     return digest.hexdigest()
 
 
-def versions() -> tuple[tuple[str, str], ...]:
-    """Names and versions of the packages that decide what is generated."""
-    return (("ballpass", __version__), *((name, version(name)) for name in ("casadi", "sympy")))
+def versions(plugins: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    """Names and versions of the packages that decide what is generated; of plugins the digests."""
+    packages = (("ballpass", __version__), *((name, version(name)) for name in ("casadi", "sympy")))
+    return (*packages, *((_PLUGIN + name, digest) for name, digest in plugins))
+
+
+def plugins_of(scene: Scene) -> tuple[tuple[str, str], ...]:
+    """Modules of plugins that a scene takes laws, elements or effects from, and digests of their sources."""
+    from ballpass.derive.bearing.effects import EFFECTS
+    from ballpass.derive.bearing.elements import ELEMENTS
+    from ballpass.derive.bearing.laws import LAWS
+
+    used: list[object] = []
+    for bearing in scene.bearings:
+        used += [LAWS[bearing.damping.law], ELEMENTS[bearing.element], *(EFFECTS[e.kind] for e in bearing.effects)]
+    if (mechanism := scene.mechanism) is not None:
+        used += [mechanism.driver.torque, *(part for force in mechanism.forces for part in (force.pathway, force.law))]
+    return tuple((name, digest_of(name) or "") for name in modules_of(*used))
+
+
+def is_of_file(manifest: mf.Manifest, path: Path) -> bool:
+    """Whether a manifest is that of a scene file as it is now, with the plugins as they are.
+
+    One that is not installed counts as unchanged, with a warning: what it decided is generated.
+    """
+    recorded = {name.removeprefix(_PLUGIN): key for name, key in manifest.versions if name.startswith(_PLUGIN)}
+    present = {name: digest_of(name) for name in recorded}
+    same = manifest.source == source_key(path, ((name, present[name] or recorded[name]) for name in recorded))
+    missing = [name for name in recorded if present[name] is None]
+    if same and missing:
+        warnings.warn(
+            f"{path} takes a law, element or effect from {', '.join(missing)}, which Python does not find here: the "
+            "model runs as it was generated, and cannot be derived anew. Install it, or give its file: --plugin "
+            f"{missing[0]}.py.",
+            PluginWarning,
+            stacklevel=2,
+        )
+    return same
 
 
 def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
@@ -71,8 +115,8 @@ def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> 
     if not isinstance(scene, str | Path):
         return None
     try:
-        present = intact_manifest(folder_of(scene, out), own=True)
-        return present if present.source == source_key(Path(scene)) else None
+        present = intact_manifest(folder_of(scene, out), own=True, made_by=deriving_sources())
+        return present if is_of_file(present, Path(scene)) else None
     except (OSError, ValueError):  # not written or not by this user; no such file, no path: the reader reports it
         return None
 
@@ -102,7 +146,8 @@ def duty_info(scene: Scene) -> tuple[mf.DutyInfo, ...]:
     return tuple(info_of(mf.DutyInfo, state) for state in scene.duty)
 
 
-def _sources() -> str:
+@cache
+def deriving_sources() -> str:
     """Digest of the deriving modules and the table of bearings: a changed derivation makes every artefact stale."""
     digest = hashlib.sha256()
     folder = Path(__file__).parent.parent

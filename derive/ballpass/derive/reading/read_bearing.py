@@ -44,13 +44,13 @@ _TABLES = (
 )
 ELEMENT = ChoiceKey(
     words="Kind of the rolling elements",
-    choices=tuple(ELEMENTS),
+    choices=ELEMENTS,
     default=next(iter(ELEMENTS)),
     note='in names of other keys and of outputs "ball" stands for either',
 )
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))
 SUPPORT = ChoiceKey(words="Support of the outer ring", choices=("elastic", "fixed"), note="fixed: nothing else")
-LAW = ChoiceKey(words="Law of the damping at a ball", choices=tuple(LAWS))
+LAW = ChoiceKey(words="Law of the damping at a ball", choices=LAWS)
 _MOVING_OUTER = (
     Needs(
         key="support",

@@ -63,7 +63,7 @@ FLYWHEEL = number(
 )
 #: Values of the placeholders in the words of the driver's speed, with a torque and without.
 START, CONSTANT = {"START": " at the start", "ZERO": "_0"}, {"START": "", "ZERO": ""}
-LAW = ChoiceKey(words="Law of the torque", choices=tuple(LAWS))
+LAW = ChoiceKey(words="Law of the torque", choices=LAWS)
 
 
 def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from typing import Any, ClassVar, Self
@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Self
 from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, SceneNumber, UsualRange, Vector
 from ballpass.derive.scene.table import MAX_NAME, MISSPELT, Table, listing, suggest
 from ballpass.derive.scene.units import COMMON, show
+from ballpass.runtime.contract.plugins import Registry
 from ballpass.runtime.contract.units import unit_size
 
 #: Values of placeholders.
@@ -362,7 +363,7 @@ class WholePairKey(WholeKey):
 class ChoiceKey(Key):
     """One of some words; with a fault the one that it is like, None where it is like none of them."""
 
-    choices: Sequence[str]
+    choices: Collection[str]
 
     @property
     def sample(self) -> str:
@@ -377,9 +378,11 @@ class ChoiceKey(Key):
         """The word."""
         if isinstance(given, str) and given in self.choices:
             return given
-        remedy = suggest(given, self.choices, f'write for example {name} = "{self.choices[0]}"')
-        self.refuse(table, name, "this is none of the choices", given, listing(self.choices), remedy)
-        return next(iter(get_close_matches(str(given)[:MAX_NAME], self.choices, n=1, cutoff=MISSPELT)), None)
+        remedy = suggest(given, choices := [*self.choices], f'write for example {name} = "{next(iter(self.choices))}"')
+        if isinstance(self.choices, Registry):
+            remedy += "; of a package of yours: install it, or give its module by --plugin"
+        self.refuse(table, name, "this is none of the choices", given, listing(choices), remedy)
+        return next(iter(get_close_matches(str(given)[:MAX_NAME], choices, n=1, cutoff=MISSPELT)), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
-from ballpass.runtime.app.commands.declared import Command, as_command, question_command
+from ballpass.runtime.app.commands.declared import Command, Plugins, as_command, question_command
 from ballpass.runtime.app.commands.derive import derive, equations
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.explore import explore
@@ -39,7 +39,7 @@ MEANT = {"simulate": "run", "solve": "run", "fmu": "export --fmu"}
 
 
 class Commands(TyperGroup):
-    """The commands; one that is called otherwise elsewhere is named."""
+    """The commands, and questions of plugins; one that is called otherwise elsewhere is named."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """As typer does it."""
@@ -72,6 +72,7 @@ def _common(
     _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    _plugin: Plugins = None,
 ) -> None:
     """Options of `ballpass` itself; the commands have their own."""
 

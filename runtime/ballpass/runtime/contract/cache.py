@@ -1,8 +1,9 @@
 """The user's cache folder, and in it the record of the generated folders that this user's ballpass wrote.
 
 A generated folder is a program, and the digests in its manifest are public formulas: they do not say who wrote it.
-The record does: an empty file for each manifest, named by the sha256 of its bytes, which hold the digests of all other
-files.  So a folder that was copied or moved is still the user's own, and no secret is needed.
+The record does: a file for each manifest, named by the sha256 of its bytes, which hold the digests of all other
+files; in it is the digest of the deriving sources that wrote them.  So a folder that was copied or moved is still the
+user's own, and no secret is needed.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ CACHE_VARIABLE = "BALLPASS_CACHE_DIR"
 #: Folder of the record, in the cache.
 WRITTEN = "written"
 
-#: Names in the record that this process wrote or found, also where the cache cannot be written.
-_known: set[str] = set()
+#: The record of what this process wrote or found, also where the cache cannot be written.
+_known: dict[str, str] = {}
 
 
 class CacheWarning(BallpassWarning):
@@ -45,15 +46,21 @@ def refuse_shared(folder: Path) -> None:
         raise OSError(errno.EPERM, "other users may write into it", str(folder))
 
 
-def note_written(manifest: bytes) -> None:
-    """Note the bytes of a manifest as written by this user; a warning where the cache cannot be written."""
+def note_written(manifest: bytes, made_by: str) -> None:
+    """Note the bytes of a manifest as written by this user; a warning where the cache cannot be written.
+
+    Parameters
+    ----------
+    made_by : digest of the deriving sources
+    """
     name = hashlib.sha256(manifest).hexdigest()
-    _known.add(name)
+    _known[name] = made_by
     folder = cache_folder() / WRITTEN
     try:
         refuse_shared(folder.parent)
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         (folder / name).touch(mode=0o600)
+        (folder / name).write_text(made_by, encoding="ascii")
     except OSError as fault:
         warnings.warn(
             f"The cache {folder.parent} cannot be written ({fault.strerror}): each process derives its scenes anew, as "
@@ -63,15 +70,14 @@ def note_written(manifest: bytes) -> None:
         )
 
 
-def was_written(manifest: bytes) -> bool:
-    """Whether this user's ballpass wrote a manifest of these bytes."""
+def was_written(manifest: bytes, made_by: str | None = None) -> bool:
+    """Whether this user's ballpass wrote a manifest of these bytes; with `made_by` by the deriving sources of it."""
     name = hashlib.sha256(manifest).hexdigest()
     if name not in _known:
         folder = cache_folder() / WRITTEN
         try:
             refuse_shared(folder.parent)
-            (folder / name).stat()
-        except OSError:  # no record, or none that can be read: derived anew
+            _known[name] = (folder / name).read_text(encoding="ascii")
+        except (OSError, UnicodeDecodeError):  # no record, or none that can be read: derived anew
             return False
-        _known.add(name)
-    return True
+    return made_by in (None, _known[name])

@@ -74,8 +74,8 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     return _parsed(folder, _manifest_bytes(folder), verify=verify)
 
 
-def intact_manifest(folder: str | Path, *, own: bool) -> Manifest:
-    """Manifest of a folder whose files have its digests; see `read_artefact`."""
+def intact_manifest(folder: str | Path, *, own: bool, made_by: str | None = None) -> Manifest:
+    """Manifest of a folder whose files have its digests; see `read_artefact`, and `was_written` for `made_by`."""
     content = _manifest_bytes(folder)
     manifest = _parsed(folder, content)
     check_files(folder, manifest)
@@ -85,6 +85,8 @@ def intact_manifest(folder: str | Path, *, own: bool) -> Manifest:
             "nothing of it was executed. Write it again with `ballpass derive`, or name the folder itself in place of "
             "the scene if you trust it."
         )
+    if made_by is not None and not was_written(content, made_by):
+        raise ArtefactError(f"{folder}: it was derived by other code than this. Write it again with `ballpass derive`.")
     return manifest
 
 
@@ -111,17 +113,17 @@ def _manifest_bytes(folder: str | Path) -> bytes:
     return content
 
 
-def write_manifest(folder: str | Path, manifest: Manifest, *, own: bool = False) -> Path:
+def write_manifest(folder: str | Path, manifest: Manifest, *, made_by: str = "") -> Path:
     """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it.
 
     Parameters
     ----------
-    own : note that this user's ballpass wrote the folder
+    made_by : note that this user's ballpass wrote the folder, with these deriving sources
     """
     target, content = Path(folder) / FILE_NAME, manifest.to_json().encode()
     replace_file(target, content)
-    if own:
-        note_written(content)
+    if made_by:
+        note_written(content, made_by)
     return target
 
 

@@ -5,10 +5,11 @@ from ballpass.derive.bearing.effects.ball_waviness import BallWaviness
 from ballpass.derive.bearing.effects.defects import Defects
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.bearing.effects.waviness import InnerWaviness, OuterWaviness
+from ballpass.runtime.contract.plugins import Registry
 
 #: Effects by the name of their table.
-EFFECTS: dict[str, Effect] = {
-    effect.name: effect for effect in (OuterWaviness(), InnerWaviness(), BallWaviness(), BallDeviation(), Defects())
-}
+EFFECTS: Registry[Effect] = Registry(
+    "effects", "effect", Effect, (OuterWaviness(), InnerWaviness(), BallWaviness(), BallDeviation(), Defects())
+)
 
 __all__ = ["EFFECTS", "Effect", "GenericBall"]

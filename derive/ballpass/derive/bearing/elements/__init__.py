@@ -3,8 +3,11 @@
 from ballpass.derive.bearing.elements.ball import Ball
 from ballpass.derive.bearing.elements.cylindrical_roller import CylindricalRoller
 from ballpass.derive.bearing.elements.element import RollingElement
+from ballpass.runtime.contract.plugins import Registry
 
 #: Elements by their name in the scene file, the usual one first.
-ELEMENTS: dict[str, RollingElement] = {element.name: element for element in (Ball(), CylindricalRoller())}
+ELEMENTS: Registry[RollingElement] = Registry(
+    "rolling_elements", "rolling element", RollingElement, (Ball(), CylindricalRoller())
+)
 
 __all__ = ["ELEMENTS", "RollingElement"]

@@ -7,10 +7,14 @@ from ballpass.derive.bearing.laws.one_sided import OneSided
 from ballpass.derive.bearing.laws.one_sided_gated import OneSidedGated
 from ballpass.derive.bearing.laws.tangent import Tangent
 from ballpass.derive.bearing.laws.two_sided_gated import TwoSidedGated
+from ballpass.runtime.contract.plugins import Registry
 
 #: Laws by their name in the scene file.
-LAWS: dict[str, DampingLaw] = {
-    law.name: law for law in (NoDamping(), OneSided(), OneSidedGated(), TwoSidedGated(), Tangent(), HuntCrossley())
-}
+LAWS: Registry[DampingLaw] = Registry(
+    "damping_laws",
+    "damping law",
+    DampingLaw,
+    (NoDamping(), OneSided(), OneSidedGated(), TwoSidedGated(), Tangent(), HuntCrossley()),
+)
 
 __all__ = ["LAWS", "DampingLaw"]

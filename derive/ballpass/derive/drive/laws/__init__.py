@@ -6,10 +6,15 @@ from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.laws.linear import LinearCharacteristic
 from ballpass.derive.drive.laws.none import NoTorque
 from ballpass.derive.drive.laws.speed_table import SpeedTable
+from ballpass.runtime.contract.plugins import Registry
 
 #: By the name that stands in the scene file.
-LAWS: dict[str, type[TorqueLaw]] = {
-    law.name: law for law in (ConstantTorque, LinearCharacteristic, SpeedTable, Asynchronous, NoTorque)
-}
+LAWS: Registry[type[TorqueLaw]] = Registry(
+    "torque_laws",
+    "torque law",
+    TorqueLaw,
+    (ConstantTorque, LinearCharacteristic, SpeedTable, Asynchronous, NoTorque),
+    classes=True,
+)
 
 __all__ = ["LAWS", "TorqueLaw"]

@@ -35,6 +35,7 @@ from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults, refuse_unknown
+from ballpass.runtime.contract.plugins import use
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions.question import Question, declared, summary_of
@@ -45,6 +46,25 @@ from ballpass.runtime.report.text import show as show_report
 
 #: Parameters of a question that say how long to run.
 LENGTH = ("cycles", "duration", "transient")
+
+
+def _use(names: list[str] | None) -> None:
+    """Import plugins before anything else is read."""
+    with command():
+        use(names or ())
+
+
+#: Modules with laws, quantities and more, before or after the name of a command.
+Plugins = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="MODULE",
+        callback=_use,
+        is_eager=True,
+        help="Module, or file of one, with laws, quantities, questions or methods of your own; may be repeated.",
+    ),
+]
 
 
 class Command(TyperCommand):
@@ -74,13 +94,14 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
     kinds = options_in({name: item.annotation for name, item in own.items()})
     required = [name for name in kinds if own[name].default is inspect.Parameter.empty]
 
-    def call(**given: Any) -> None:
+    def call(plugin: object = None, **given: Any) -> None:
         with command(given.get("scene")):
             _refuse_missing({name: kinds[name][1] for name in required if not given[name]})
             values = _read(kinds, given)
         function(**{**given, **values})
 
     parameters = [_typer_option(item, *kinds[name]) if name in kinds else item for name, item in own.items()]
+    parameters.append(_parameter("plugin", Plugins, None))
     return _with_signature(call, function.__name__, function.__doc__ or "", parameters)
 
 

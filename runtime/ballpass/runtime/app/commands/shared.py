@@ -305,13 +305,13 @@ def read_own(
             inspect(read_manifest(scene))
         return read(scene, False)
     from ballpass.derive.emit.generate import generate
-    from ballpass.derive.emit.signature import source_key
+    from ballpass.derive.emit.signature import is_of_file
 
     for _ in range(ATTEMPTS):
         folder = generate(scene, generated_folder(scene), progress=stages, inspect=inspect)
         with contextlib.suppress(ForeignFolderError):
             found = read(folder, True)
-            if manifest(found).source == source_key(scene):
+            if is_of_file(manifest(found), scene):
                 return found
     raise RequestError(
         f"{folder}: other processes keep writing another scene of the name {scene.stem} there. Allowed: one scene for "
