@@ -82,6 +82,18 @@ def test_a_changed_structure_changes_the_signature(scene_text: Callable[..., str
     assert signature(plain) != signature(changed)
 
 
+def test_other_deriving_sources_derive_anew_and_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A comment in derive makes every folder stale, and branches that each have one write one manifest."""
+    scene, derived = ROOT / "scenes/varying_compliance.toml", []
+    folder = generate(scene, tmp_path / "vc")
+    before = (folder / "manifest.json").read_bytes()
+    monkeypatch.setattr("ballpass.derive.emit.signature.deriving_sources", lambda: "others")
+    monkeypatch.setattr("ballpass.derive.emit.generate.deriving_sources", lambda: "others")
+    generate(scene, folder, progress=derived.append)
+    assert "derive" in derived
+    assert (folder / "manifest.json").read_bytes() == before
+
+
 def test_an_edited_or_missing_file_is_derived_again(tmp_path: Path) -> None:
     scene = ROOT / "scenes/varying_compliance.toml"
     folder = generate(scene, tmp_path / "vc")

@@ -14,10 +14,15 @@ import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber, Vector
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.elements import element_words
 
 #: Time since the reference time of the phases [s] (see `System.inputs`).
 TIME = sp.Symbol("t", real=True)
+
+
+class ExpressionError(RequestError, TypeError):
+    """An expression, as of a law, has a function or a condition that is not computed, or whose kink is not located."""
 
 
 class Smoothness(Enum):

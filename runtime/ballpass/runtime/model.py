@@ -21,6 +21,7 @@ from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.plugins import use
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.ensemble_parts import simulate_parts
 from ballpass.runtime.many.members import Table
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
 
 
 @typed
-def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
+def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True, plugins: Sequence[str] = ()) -> Model:
     """Load a generated folder; compile its C when no cached library fits.
 
     A generated folder is a program, which runs with your rights: load only folders you trust.  The digests of its
@@ -60,6 +61,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     folder : what `ballpass derive` wrote
     compiler : command of a C compiler.  Default: the first found of $CC, cc, gcc, clang, ziglang
     verify : refuse files that differ from the manifest's digests
+    plugins : modules, or files of them, with quantities, questions or methods of your own; known from then on
 
     Warns
     -----
@@ -81,6 +83,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     >>> model.parameters["bearing.clearance"]  # [m]
     1e-05
     """
+    use(plugins)
     return _loaded(folder, compiler, partial(read_artefact, folder, verify=verify))
 
 

@@ -23,10 +23,14 @@ from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.terms import TIME, Definition, Names, names_of, symbol_of
+from ballpass.derive.scene.table import listing
+from ballpass.derive.terms import TIME, Definition, ExpressionError, Names, names_of, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
+
+#: Functions that a damping law may not have: case distinctions that nothing finds.
+_KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,7 +204,13 @@ def _ball(
     delta, delta_rate = names.variable("ball.deflection"), names.variable("ball.deflection_rate")
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))
     parts = [contact.force(delta)]
-    damped = LAWS[bearing.damping.law].force(delta, delta_rate, names.constant("c_b"), contact, rest)
+    damped = sp.sympify(LAWS[bearing.damping.law].force(delta, delta_rate, names.constant("c_b"), contact, rest))
+    if kinked := [kind.__name__ for kind in _KINKED if damped.has(kind)]:
+        raise ExpressionError(
+            f'The damping law "{bearing.damping.law}" has {listing(kinked)}, whose kinks are not located. Allowed: '
+            "sympy.Piecewise((a, condition), (b, True)), with conditions on the deflection or the rate; "
+            "rest.positive(rate) for the positive part. Write one."
+        )
     if contact.width is None and rest.width is None:
         damped = sp.piecewise_fold(damped)  # constants meet in one product
     definitions = [

@@ -27,7 +27,7 @@ import mpmath
 import sympy as sp
 from sympy.core.relational import Relational
 
-from ballpass.derive.terms import Smoothness
+from ballpass.derive.terms import ExpressionError, Smoothness
 
 #: A law is smooth enough where this derivative is continuous: its branches differ by a higher power of the distance.
 KINK_ORDER = 2
@@ -125,7 +125,7 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
 
     Raises
     ------
-    TypeError
+    ExpressionError
         A condition is not of the form deflection or rate against a constant of the run.
     """
     found: dict[tuple[bool, sp.Expr], list[_SwitchPlace]] = {}
@@ -186,7 +186,10 @@ def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tu
         for start, above in ((symbol - larger, True), (symbol + larger, False)):
             if symbol in larger.free_symbols and not start.free_symbols & {symbol, other}:
                 return symbol == rate, start, above
-    raise TypeError(f"the condition {condition} is expected to compare deflection or rate with a constant of the run")
+    raise ExpressionError(
+        f"the condition {condition} is expected to compare deflection or rate with a constant of the run: "
+        "steps end where it changes."
+    )
 
 
 def _look(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +36,7 @@ from ballpass.runtime.contract.folder import (
     write_manifest,
 )
 from ballpass.runtime.contract.folders import locked, read_file, replace_files
+from ballpass.runtime.contract.plugins import use
 from ballpass.runtime.show.progress import shown
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def generate(
     out: str | Path | None = None,
     *,
     force: bool = False,
+    plugins: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     inspect: Callable[[mf.Manifest], None] | None = None,
 ) -> Path:
@@ -74,6 +76,7 @@ def generate(
     scene : path of a scene file, or a scene
     out : folder to write; ``./generated/<scene name>`` by default
     force : derive again even where nothing changed
+    plugins : see `read_scene`
     progress : called with the name of each stage
     inspect : called with the model's manifest before C is generated; nothing is written where it raises
 
@@ -94,6 +97,7 @@ def generate(
     >>> load(folder).outputs[-1]
     'drive_torque'
     """
+    use(plugins)
     say = progress or (lambda _: None)
     look = inspect or (lambda _: None)
     fresh = None if force else fresh_manifest(scene, out)

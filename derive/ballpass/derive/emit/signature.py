@@ -22,7 +22,7 @@ from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.folder import intact_manifest
 from ballpass.runtime.contract.folders import read_file
-from ballpass.runtime.contract.plugins import PluginWarning, digest_of, modules_of
+from ballpass.runtime.contract.plugins import PluginWarning, digest_of, modules_of, used_modules
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
@@ -116,6 +116,9 @@ def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> 
         return None
     try:
         present = intact_manifest(folder_of(scene, out), own=True, made_by=deriving_sources())
+        recorded = {name.removeprefix(_PLUGIN) for name, _ in present.versions}
+        if not used_modules() <= recorded:  # one may have a law of the same name
+            return None
         return present if is_of_file(present, Path(scene)) else None
     except (OSError, ValueError):  # not written or not by this user; no such file, no path: the reader reports it
         return None

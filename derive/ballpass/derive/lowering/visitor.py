@@ -18,6 +18,7 @@ import sympy as sp
 
 from ballpass.derive.bearing.elements.hertz import ellipticity
 from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
+from ballpass.derive.terms import ExpressionError
 from ballpass.derive.variables import DRIVER_ANGLE
 
 #: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
@@ -70,7 +71,7 @@ class Visitor:
 
         Raises
         ------
-        TypeError
+        ExpressionError
             Where the expression holds a symbol or function without a meaning here.
         """
         expression = sp.sympify(expression)
@@ -136,7 +137,7 @@ class Visitor:
                 if self._hoist is not None and not _is_trivial(defined) and self._fixed(defined):
                     return self._hoist(self._closed(expression))
                 return self(defined)
-            raise TypeError(f"the symbol {expression} has no value here")
+            raise ExpressionError(f"the symbol {expression} has no value here")
         if self._hoist is not None and not _is_trivial(expression) and self._fixed(expression):
             return self._hoist(self._closed(expression))
         if isinstance(expression, sp.Add | sp.Mul) and self._hoist is not None:
@@ -179,7 +180,11 @@ class Visitor:
             return _ellipticity(self(expression.args[0]))
         function = _FUNCTIONS.get(expression.func)
         if function is None:
-            raise TypeError(f"no CasADi expression is known for {expression.func.__name__} in {expression}")
+            raise ExpressionError(
+                f"no CasADi expression is known for {expression.func.__name__} in {expression}. Allowed: powers, "
+                f"{', '.join(sorted(str(f.__name__) for f in _FUNCTIONS if f not in _KINKED))}, and Piecewise in place "
+                f"of {', '.join(f.__name__ for f in _KINKED)}, whose slopes are not computed."
+            )
         return function(*(self(a) for a in expression.args))
 
     def _sum(self, expression: sp.Basic) -> ca.SX:
@@ -240,7 +245,7 @@ class Visitor:
         pieces = [(e, c) for e, c in expression.args]
         last, condition = pieces[-1]
         if condition is not sp.true:
-            raise TypeError(f"the piecewise expression {expression} leaves cases open")
+            raise ExpressionError(f"the piecewise expression {expression} leaves cases open")
         result = self(last)
         for value, condition in reversed(pieces[:-1]):
             # `if_else` gates the value, so that a square root of a negative deflection never enters a sum or derivative
@@ -330,6 +335,10 @@ def _ellipticity(ratio: ca.SX) -> ca.SX:
         slope = 1 / quotient - 2 / m + quotient * square / m
         log_kappa = log_kappa - residual / slope
     return ca.exp(log_kappa)
+
+
+#: Functions with kinks or jumps that no step would end on.
+_KINKED = (sp.Abs, sp.Max, sp.Min, sp.floor, sp.sign)
 
 
 def _fold(function: Callable[[ca.SX, ca.SX], ca.SX]) -> Callable[..., ca.SX]:

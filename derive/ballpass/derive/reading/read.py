@@ -51,6 +51,7 @@ from ballpass.derive.terms import Names, names_of
 from ballpass.runtime.contract.arguments import typed
 from ballpass.runtime.contract.defaults import STEADY_CYCLES
 from ballpass.runtime.contract.folders import read_file
+from ballpass.runtime.contract.plugins import use
 from ballpass.runtime.time.repetition import LOCKED, near_fraction
 
 T = TypeVar("T", Bearing, Load)
@@ -82,6 +83,8 @@ def read_scene(
     coupling: Coupling | None = None,
     changes: Mapping[str, Any] | None = None,
     name: str | None = None,
+    *,
+    plugins: Sequence[str] = (),
 ) -> Scene:
     """Read a scene file.
 
@@ -92,6 +95,7 @@ def read_scene(
     ----------
     changes : tables and values that replace those of the file or are added; None removes one
     name : of the scene; the file's stem by default
+    plugins : modules, or files of them, with laws and more of your own; known from then on
 
     Raises
     ------
@@ -104,6 +108,7 @@ def read_scene(
     >>> scene.name, scene.bearing.balls
     ('rotor', 8)
     """
+    use(plugins)
     file = Path(path)
     try:
         data = read_file(file, MAX_FILE_SIZE)

@@ -24,12 +24,13 @@ from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.run import run
 from ballpass.runtime.app.commands.schema import schema
 from ballpass.runtime.app.commands.select import select
-from ballpass.runtime.app.commands.shared import complain
+from ballpass.runtime.app.commands.shared import command, complain
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import trade
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.questions import QUESTIONS
+from ballpass.runtime.questions import QUESTIONS, added_questions
+from ballpass.runtime.questions.question import declared
 
 #: Groups of commands in ``ballpass --help``, in this order.
 DESCRIBE, SIMULATE, ASK = "From scene to equations", "Simulate and export", "Ask of a scene"
@@ -47,6 +48,24 @@ class Commands(TyperGroup):
             complain(f"There is no command '{args[0]}'. `ballpass {MEANT[args[0]]} SCENE` does it.")
             raise typer.Exit(2)
         return super().resolve_command(ctx, args)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """One of ballpass, or of a question of a plugin."""
+        own = super().get_command(ctx, cmd_name)
+        if own is not None or cmd_name in MEANT:
+            return own
+        with command():
+            found = {declared(ask).name: ask for ask in added_questions().values()}
+        if cmd_name not in found:
+            return None
+        extra = typer.Typer(add_completion=False)
+        extra.command(cmd_name, cls=Command, rich_help_panel=ASK)(question_command(found[cmd_name]))
+        return typer.main.get_command(extra)
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Those of ballpass, and questions of plugins."""
+        with command():
+            return [*super().list_commands(ctx), *(declared(ask).name for ask in added_questions().values())]
 
 
 app = typer.Typer(

@@ -41,6 +41,10 @@ class PluginWarning(BallpassWarning):
     """A plugin that a model was derived with is not installed."""
 
 
+class MissingEntryError(RequestError, KeyError):
+    """Neither ballpass nor a plugin has an entry of this name."""
+
+
 def use(names: Iterable[str]) -> None:
     """Add modules that no entry point names: their names, or paths of files ``.py``.
 
@@ -59,6 +63,11 @@ def use(names: Iterable[str]) -> None:
         module = path.stem if path.suffix == ".py" else name
         _entries(module)
         _used[module] = None
+
+
+def used_modules() -> set[str]:
+    """Top-level modules that `use` was called with."""
+    return {module.partition(".")[0] for module in _used}
 
 
 def entries_of(group: str) -> Iterator[Any]:
@@ -114,7 +123,7 @@ class Registry(Mapping[str, T]):
     group : one of `GROUPS`
     word : what an entry is called
     kind : class of the entries
-    own : ballpass's own
+    own : ballpass's own; by name where `name` does not give it
     name : of an entry
     classes : whether the entries are classes, not objects
     """
@@ -124,16 +133,24 @@ class Registry(Mapping[str, T]):
         group: str,
         word: str,
         kind: type[Any],
-        own: Iterable[T],
+        own: Iterable[T] | Mapping[str, T],
         *,
         name: Callable[[Any], str] = attrgetter("name"),
         classes: bool = False,
     ) -> None:
         self._group, self._word, self._kind, self._name, self._classes = group, word, kind, name, classes
-        self._own: dict[str, T] = {name(entry): entry for entry in own}
+        self._own = dict(own) if isinstance(own, Mapping) else {name(entry): entry for entry in own}
 
     def __getitem__(self, name: str) -> T:
-        return self._own[name] if name in self._own else self.added()[name]
+        if name in self._own:
+            return self._own[name]
+        found = self.added()
+        if name not in found:
+            raise MissingEntryError(
+                f"There is no {self._word} {name!r} here. Allowed: {', '.join((*self._own, *found))}. Install the "
+                "package that has it, or give its module by --plugin."
+            )
+        return found[name]
 
     def __iter__(self) -> Iterator[str]:
         yield from self._own

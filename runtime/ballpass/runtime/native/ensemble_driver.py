@@ -29,7 +29,7 @@ from ballpass.runtime.native.driver_library import (
 )
 from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import MAX_STEPS, NAMES, RESULT, Stepper
+from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, Stepper, method_numbers
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
@@ -169,7 +169,7 @@ class EnsembleDriver:
         carried = self.carry(count) if carried is None else carried
         limits = np.full(count, max_steps, dtype=ctypes.c_long)
         options = _EnsembleOptions(
-            method=NAMES.index(method),
+            method=method_numbers().index(method),
             resume=int(carried.begun),
             max_steps=address(limits, ctypes.c_long),
             stop=ctypes.pointer(stop),

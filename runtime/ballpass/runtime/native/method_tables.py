@@ -53,9 +53,13 @@ typedef struct {
 } bp_method;"""
 
 
-@lru_cache(maxsize=1)
 def method_tables() -> str:
     """Text of the header."""
+    return _tables(tuple(METHODS))
+
+
+@lru_cache(maxsize=1)
+def _tables(_names: tuple[str, ...]) -> str:
     explicit = {name: t for name, t in METHODS.items() if isinstance(t, ExplicitTableau)}
     linear = {name: t for name, t in METHODS.items() if isinstance(t, RosenbrockTableau)}
     stages = max(*(t.stages for t in linear.values()), *(t.stages + 1 + len(t.dense_nodes) for t in explicit.values()))

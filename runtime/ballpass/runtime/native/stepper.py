@@ -31,8 +31,9 @@ from ballpass.runtime.native.driver_library import (
 MAX_STEPS = 20_000_000
 
 
-#: Methods by their numbers in C.
-NAMES = ("auto", *METHODS)
+def method_numbers() -> tuple[str, ...]:
+    """Names of the methods by their numbers in C."""
+    return ("auto", *METHODS)
 
 
 class End(IntEnum):
@@ -274,7 +275,7 @@ class Stepper:
         keeps = ctypes.c_long(0)
         options = _Options(
             *(
-                NAMES.index(method),
+                method_numbers().index(method),
                 max_steps,
                 first_step,
                 smallest_step,
@@ -308,7 +309,7 @@ class Stepper:
             )
             self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
         reported = {name: getattr(result, name) for name in _REPORTED}
-        return Outcome(end=End(result.status), method=NAMES[result.method], kept=keeps.value, **reported)
+        return Outcome(end=End(result.status), method=method_numbers()[result.method], kept=keeps.value, **reported)
 
     def read(self, kept: np.ndarray, times: np.ndarray) -> np.ndarray:
         """States at times of a run whose steps were kept, the same bits as its outputs there, shape (times, states).

@@ -22,7 +22,7 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.quantity.records import Kind, Quantity
-from ballpass.runtime.quantity.registry import ALSO, KINDS
+from ballpass.runtime.quantity.registry import KINDS, find_kind
 from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.request.request import no_output
 from ballpass.runtime.run.reductions import channel_names
@@ -149,10 +149,11 @@ def _kind_of(text: str) -> Kind | None:
     form = _FORM.fullmatch(str(text))
     if form is None:
         return None
-    found = KINDS.get(ALSO.get(form["kind"], form["kind"]))
+    found = find_kind(form["kind"])
     if found is None or found.takes in ("nothing", "bearing at rest"):
         allowed = [name for name, kind in KINDS.items() if kind.takes in ("channel", "bearing")]
-        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*allowed, *ALSO])}")
+        also = [name for kind in KINDS.values() for name in kind.also]
+        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*allowed, *also])}")
     return found
 
 

@@ -108,6 +108,11 @@ def declared(ask: Callable[..., Any]) -> Question:
     return _DECLARED[ask]
 
 
+def is_declared(function: Any) -> bool:
+    """Whether a function is a question."""
+    return callable(function) and function in _DECLARED
+
+
 def summary_of(function: Callable[..., Any]) -> str:
     """The docstring's paragraphs in front of its sections, each a line."""
     paragraphs = cleandoc(function.__doc__ or "").partition("\n\nParameters\n")[0].split("\n\n")

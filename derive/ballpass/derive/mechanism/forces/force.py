@@ -31,6 +31,7 @@ from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output, StateSwitch
 from ballpass.runtime.contract.manifest import UsualInfo
+from ballpass.runtime.contract.plugins import added
 
 __all__ = ["Action", "ForceTable", "Law", "Measure", "Pathway", "Points", "Setting"]
 
@@ -96,6 +97,7 @@ class Pathway(ABC):
     Attributes
     ----------
     key : the key of the scene that selects it; empty for the default pathway of a table
+    tables : of a plugin's, keys of the tables it may stand in
     measure : the size that a law may depend on; None where there is none
     column, unit : of a law that gives an amount, not a factor: "force" in "N"
     column_unit : of the column where it is no amount itself: "pressure" in "Pa"
@@ -103,6 +105,7 @@ class Pathway(ABC):
 
     __slots__ = ()
     key: ClassVar[str] = ""
+    tables: ClassVar[tuple[str, ...]] = ()
     column: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
     column_unit: ClassVar[str] = ""
@@ -159,11 +162,13 @@ class Law(ABC):
     Attributes
     ----------
     key : the key of the scene that selects it; empty for the default law
+    tables : of a plugin's, keys of the tables it may stand in
     factor : it gives a factor [1] for the force or torque of the pathway, not an amount
     """
 
     __slots__ = ()
     key: ClassVar[str] = ""
+    tables: ClassVar[tuple[str, ...]] = ()
     factor: ClassVar[bool] = False
 
     @classmethod
@@ -200,8 +205,18 @@ class ForceTable:
     key: str
     word: str
     example: str
-    pathways: tuple[type[Pathway], ...]
-    laws: tuple[type[Law], ...]
+    own_pathways: tuple[type[Pathway], ...]
+    own_laws: tuple[type[Law], ...]
+
+    @property
+    def pathways(self) -> tuple[type[Pathway], ...]:
+        """With those of plugins, in front."""
+        return (*(p for p in added("force_laws", Pathway, classes=True) if self.key in p.tables), *self.own_pathways)
+
+    @property
+    def laws(self) -> tuple[type[Law], ...]:
+        """With those of plugins, in front."""
+        return (*(law for law in added("force_laws", Law, classes=True) if self.key in law.tables), *self.own_laws)
 
     def read(self, data: Table, name: str, points: Points) -> Force:
         """One force of the table."""

@@ -25,7 +25,7 @@ from ballpass.runtime.app.commands.shared import (
 )
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.method_registry import STEPPERS
+from ballpass.runtime.contract.method_registry import CHOICE, OWN, STEPPERS
 from ballpass.runtime.contract.options import (
     Cycles,
     Duration,
@@ -59,7 +59,7 @@ Of = Annotated[
 Method = Annotated[
     str | None,
     Option(
-        words=f"Integrator: {', '.join(f'`{name}`' for name in ('auto', *STEPPERS, 'cvodes'))}.",
+        words=f"Integrator: `auto`, `{CHOICE}`, {', '.join(f'`{CHOICE}-{name}`' for name in OWN)}, `cvodes`.",
         shown="NAME",
         names=option_names.methods,
     ),

@@ -1,0 +1,194 @@
+"""A law of a package of the user's own, as the how-to page has it: in every command, fresh, missing, wrong."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ballpass.runtime.contract import plugins
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.testing import ConformanceError, check_damping_law
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = (ROOT / "docs/howto/own_law.md").read_text(encoding="utf-8")
+LAW, TEST = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+PROJECT, TABLE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+NUMBERS = TABLE.split("\n", 2)[2]
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def install(site: Path, law: str = LAW) -> None:
+    """The page's package as an installer leaves it."""
+    info = site / "cubic_damping-0.1.dist-info"
+    info.mkdir(parents=True, exist_ok=True)
+    (site / "cubic_damping.py").write_text(law, encoding="utf-8")
+    points = re.search(r"entry-points.ballpass\]\n(.*?)\n\n", PROJECT, re.DOTALL)
+    assert points
+    (info / "entry_points.txt").write_text("[ballpass]\n" + points[1].replace('"', "") + "\n", encoding="utf-8")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cubic-damping\nVersion: 0.1\n", encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the press under the law, and the package installed in ``site``."""
+    folder = tmp_path_factory.mktemp("plugin")
+    text = (ROOT / "scenes/punching_press.toml").read_text(encoding="utf-8")
+    text = text.replace('law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"', f'law = "cubic"\n{NUMBERS}')
+    (folder / "press.toml").write_text(text, encoding="utf-8")
+    install(folder / "site")
+    return folder
+
+
+@pytest.fixture
+def command(place: Path) -> Run:
+    def run(*words: str, site: str = "site") -> subprocess.CompletedProcess[str]:
+        paths = [*([str(place / site)] if site else []), os.environ.get("PYTHONPATH", "")]
+        # -P: the folder of the command is no place of modules, as for the installed command
+        given = [sys.executable, "-P", "-c", "from ballpass.runtime.app.entry import main; main()", *words]
+        env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+        return subprocess.run(given, capture_output=True, text=True, check=False, cwd=place, env=env, timeout=300)
+
+    return run
+
+
+def highest(done: subprocess.CompletedProcess[str]) -> float:
+    assert done.returncode == 0, done.stderr
+    (quantity,) = json.loads(done.stdout)["quantities"].values()
+    return float(quantity["value"])
+
+
+RUN = ("run", "press.toml", "--no-figures", "--json", "--cycles", "0.3", "--transient", "0", "--of", "max:ball.force")
+
+
+def test_a_law_runs_is_derived_anew_where_it_changes_and_runs_where_it_is_missing(place: Path, command: Run) -> None:
+    first = highest(command(*RUN))
+    install(place / "site", LAW.replace("rate**3", "9 * rate**3"))
+    try:
+        assert abs(highest(command(*RUN)) / first - 1.0) > 1e-3
+    finally:
+        install(place / "site")
+    assert highest(command(*RUN)) == first
+    missing = command(*RUN, site="")
+    assert highest(missing) == first
+    assert "cubic_damping" in missing.stderr
+    assert "cannot be derived anew" in " ".join(missing.stderr.split())
+    refused = command("derive", "press.toml", "--check", site="")
+    assert refused.returncode == 2
+    assert "--plugin" in refused.stderr
+    assert highest(command("--plugin", "site/cubic_damping.py", *RUN, site="")) == first
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("derive", "press.toml", "--check"),
+        ("equations", "press.toml"),
+        ("explain", "press.toml"),
+        ("schema",),
+        ("export", "press.toml", "--c", "--out", "program"),
+        ("linearize", "press.toml"),
+        ("jacobian", "press.toml", "--of", "ball.force", "--wrt", "bearing.damping.cubic"),
+        ("life", "press.toml"),
+        ("sensitivity", "press.toml", "--of", "max:ball.force", "--wrt", "bearing.damping.cubic"),
+        ("spectrum", "press.toml", "--no-figures"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_command_knows_the_law(command: Run, words: tuple[str, ...]) -> None:
+    done = command(*words)
+    assert done.returncode in (0, 1) if words[0] == "life" else done.returncode == 0, done.stderr
+
+
+# the kit, in this process
+
+
+@pytest.fixture
+def law_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """A module with the page's law, changed; forgotten after the test."""
+    monkeypatch.setattr(plugins, "_used", {})
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def write(name: str, *changes: tuple[str, str]) -> str:
+        text = LAW
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+        importlib.invalidate_caches()
+        return name
+
+    return write
+
+
+def test_the_kit_passes_the_page_s_law(law_of: Callable[..., str]) -> None:
+    assert 'check_damping_law("cubic"' in TEST
+    check_damping_law("cubic", NUMBERS, plugins=[law_of("right_law")])
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("wrong_unit", "rate**3", "rate**2 * sp.Piecewise((1, rate > 0), (-1, True))", "has not the unit N"),
+        ("no_event", "rate**3", "rate**3 * (1 + sp.tanh((rate - 0.01) / 1e-20)) / 2", "jumps at the rate 0.01"),
+        ("gives_energy", "rate**3", "-(rate**3)", "gives energy"),
+        ("not_zero", "rate**3", "(rate**3 + coefficient / coefficient)", "not zero at rest"),
+        ("wrong_slope", "rate**3", "rate**3 * (1 + sp.sin(rate * 1e14) / 2)", "its slope by the rate"),
+    ],
+)
+def test_the_kit_catches_a_wrong_law(law_of: Callable[..., str], name: str, old: str, new: str, words: str) -> None:
+    module = law_of(name, (old, new), ("from types", "import sympy as sp\nfrom types"))
+    with pytest.raises(ConformanceError, match=words):
+        check_damping_law("cubic", NUMBERS, plugins=[module])
+
+
+@pytest.mark.parametrize("function", ["Max", "Abs", "floor"])
+def test_a_function_with_kinks_is_refused_in_words(law_of: Callable[..., str], function: str) -> None:
+    more = ", 0" if function == "Max" else ""
+    old, new = ("rate**3", f"sp.{function}(rate{more}) * rate**2"), ("from types", "import sympy as sp\nfrom types")
+    with pytest.raises(RequestError, match=rf'"{function}", whose kinks are not located. Allowed: sympy.Piecewise'):
+        check_damping_law("cubic", NUMBERS, plugins=[law_of(f"with_{function}", old, new)])
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("a_class", "(Cubic(),)", "(Cubic,)", r"lists the class Cubic. Allowed: an object"),
+        ("no_tuple", "BALLPASS = ", "OTHER = ", "no tuple BALLPASS"),
+        ("twice", 'name = "cubic"', 'name = "tangent"', "a damping law 'tangent' already"),
+        ("broken", "BALLPASS = ", "BALLPASS = 1 / 0, ", "cannot be imported .ZeroDivisionError"),
+    ],
+)
+def test_a_wrong_plugin_is_refused_in_words(
+    law_of: Callable[..., str], name: str, old: str, new: str, words: str
+) -> None:
+    with pytest.raises(RequestError, match=words):
+        check_damping_law("cubic", NUMBERS, plugins=[law_of(name, (old, new))])
+    with pytest.raises(RequestError, match="no such file"):
+        plugins.use(["none.py"])
+
+
+def test_sources_beside_a_module_and_within_a_package_are_in_the_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "alone_law.py").write_text("BALLPASS = ()\n")
+    (tmp_path / "packed_law").mkdir()
+    (tmp_path / "packed_law/__init__.py").write_text("")
+    importlib.invalidate_caches()
+    assert plugins.digest_of("not_there_law") is None
+    for module, helper in (("alone_law", "helper.py"), ("packed_law", "packed_law/numbers.txt")):
+        before = plugins.digest_of(module)
+        (tmp_path / helper).write_text("1")
+        assert plugins.digest_of(module) != before
+    shutil.rmtree(tmp_path / "packed_law")
