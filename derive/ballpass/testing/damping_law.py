@@ -169,8 +169,9 @@ def _jumps(formula: sp.Expr, force: Force) -> Iterator[str]:
             first = abs(values[k + 1] - values[k])
             for _ in range(60):
                 middle = 0.5 * (low + high)
-                low, high = (low, middle) if abs(value(middle) - value(low)) > 0.5 * first else (middle, high)
-            if abs(value(high) - value(low)) < 0.4 * first:
+                left = abs(value(middle) - value(low)) > abs(value(high) - value(middle))
+                low, high = (low, middle) if left else (middle, high)
+            if abs(value(high) - value(low)) < 0.2 * first:
                 continue
             symbol = _RATE if words == "rate" else _DELTA
             known = [
