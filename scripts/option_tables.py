@@ -20,7 +20,8 @@ def with_tables(page: str) -> str:
     """The page with the table of each command that has options, as its help has it."""
     commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     for name, command in commands.items():
-        rows = [_row(item) for item in command.params if item.param_type_name == "option"]
+        options = [item for item in command.params if item.param_type_name == "option"]
+        rows = [_row(item) for item in options if item.opts != ["--plugin"]]  # said once, above the tables
         if not rows:
             continue
         table = "\n".join(["| option | meaning |", "| --- | --- |", *rows, ""])

@@ -30,7 +30,7 @@ def sections() -> dict[str, str]:
 def accepted(command: str) -> Iterator[tuple[str, str]]:
     """Ways to write each option, and what it is: an option or what it does anyway."""
     for parameter in COMMANDS[command].params:
-        if parameter.param_type_name != "option":
+        if parameter.param_type_name != "option" or parameter.opts == ["--plugin"]:  # said once, above them
             continue
         on_anyway = bool(parameter.secondary_opts) and parameter.default is True
         yield from ((text, "anyway" if on_anyway else "option") for text in parameter.opts)

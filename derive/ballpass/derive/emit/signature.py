@@ -44,7 +44,7 @@ def signature(scene: Scene) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def source_key(path: Path, plugins: Iterable[tuple[str, str]]) -> str:
+def source_key(path: Path, plugins: Iterable[tuple[str, str]] = ()) -> str:
     """Digest of a scene file and the files it names, whatever ends of lines; of versions and plugins.
 
     Raises
