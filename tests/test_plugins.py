@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from ballpass.runtime import Model, load
 from ballpass.runtime.contract import plugins
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.testing import ConformanceError, check_damping_law
@@ -176,6 +177,50 @@ def test_a_wrong_plugin_is_refused_in_words(
         check_damping_law("cubic", NUMBERS, plugins=[law_of(name, (old, new))])
     with pytest.raises(RequestError, match="no such file"):
         plugins.use(["none.py"])
+
+
+#: A method, a kind of quantity and a question that are ballpass's by other names.
+OTHERS = """
+from dataclasses import replace
+
+from ballpass.runtime.contract.method_registry import OWN
+from ballpass.runtime.quantity.kinds.extremes import KINDS
+from ballpass.runtime.questions.question import Question
+
+TOP = replace(next(kind for kind in KINDS if kind.name == "max"), name="top", also=("uppermost",))
+PAIR = replace(OWN["dp54"], name="My Pair 5(4)", number=1)
+
+
+@Question()
+def count_states(model, *, parameters=None):
+    'How many states a model has.'
+    return len(model.states)
+
+
+BALLPASS = (TOP, PAIR, count_states)
+"""
+
+
+@pytest.mark.long
+def test_methods_quantities_and_questions_of_a_module(
+    make_model: Callable[..., Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They give what those of ballpass give, which they are; forgotten, none of them is there."""
+    monkeypatch.setattr(plugins, "_used", {})
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    folder = make_model("varying_compliance").folder
+    (tmp_path / "other_things.py").write_text(OTHERS, encoding="utf-8")
+    model = load(folder, plugins=[str(tmp_path / "other_things.py")])
+    assert model.count_states() == len(model.states)  # type: ignore[operator]
+    run = {"cycles": 0.2, "transient": 0}
+    own, mine = (model.simulate(method=f"stepper-{name}", **run) for name in ("dp54", "mypair54"))
+    assert (own.x == mine.x).all()
+    found = model.quantities(["max:ball.force", "top:ball.force", "uppermost:ball.force"], **run)
+    assert len({value.value for value in found.values()}) == 1
+    monkeypatch.setattr(plugins, "_used", {})
+    assert not hasattr(model, "count_states")
+    with pytest.raises(RequestError, match="no kind of quantity 'top'"):
+        model.quantities(["top:ball.force"], **run)
 
 
 def test_sources_beside_a_module_and_within_a_package_are_in_the_digest(

@@ -180,9 +180,10 @@ class Visitor:
             return _ellipticity(self(expression.args[0]))
         function = _FUNCTIONS.get(expression.func)
         if function is None:
+            known = sorted(str(getattr(f, "__name__", f)) for f in _FUNCTIONS if f not in _KINKED)
             raise ExpressionError(
                 f"no CasADi expression is known for {expression.func.__name__} in {expression}. Allowed: powers, "
-                f"{', '.join(sorted(str(f.__name__) for f in _FUNCTIONS if f not in _KINKED))}, and Piecewise in place "
+                f"{', '.join(known)}, and Piecewise in place "
                 f"of {', '.join(f.__name__ for f in _KINKED)}, whose slopes are not computed."
             )
         return function(*(self(a) for a in expression.args))
