@@ -88,7 +88,7 @@ def swing_of(linkage: Linkage, body: str) -> Swing:
     pose, positions, period = linkage.pose(body), linkage.positions, linkage.turns
     if sp.sympify(pose.cos).is_number:
         return STILL
-    if pose.angle is not None:  # in proportion to the driver's
+    if pose.angle is not None and linkage.drive.swings is None:  # in proportion to the driver's
         return Swing(turns=sp.diff(pose.angle, linkage.drive.angle), rate=pose.rate)
     mark, start = subscript(body), linkage.drive.first_angle
     turns, mean, swing, at_start = (
