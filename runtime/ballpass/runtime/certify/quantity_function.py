@@ -26,7 +26,7 @@ from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 from ballpass.runtime.contract.arguments import brief, typed_methods
 from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name, wrong_unit
+from ballpass.runtime.contract.parameters import Numbers, check_name, wrong_unit
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.slopes import KinkWarning
@@ -108,10 +108,10 @@ class QuantityFunction:
         failed: Literal["raise", "nan"] = "raise",
         chaos: Literal["refuse", "ignore"] = "refuse",
     ) -> None:
-        _check_word("failed", failed, ("raise", "nan"))
+        check_name("choice of failed", failed, ("raise", "nan"))
         if kinks is not None:
             check_kinks(kinks)
-        _check_word("chaos", chaos, ("refuse", "ignore"))
+        check_name("choice of chaos", chaos, ("refuse", "ignore"))
         self.of = (of,) if isinstance(of, str) else tuple(of)
         self.wrt = (wrt,) if isinstance(wrt, str) else tuple(wrt)
         self.shape = () if isinstance(of, str) else (len(self.of),)
@@ -123,8 +123,7 @@ class QuantityFunction:
             if not names or len(dict.fromkeys(names)) < len(names):
                 raise RequestError(f"{what}: one name or more is expected, each once, not {list(names)!r}.")
         for name in self.wrt:
-            if name not in numbers.parameters:
-                raise RequestError(unknown_name("parameter", name, numbers.parameters))
+            check_name("parameter", name, numbers.parameters)
         self.start = np.array([numbers.parameters[name] for name in self.wrt])
         self._quantities = quantities_of(model, self.of)
         self._request = length_request(model, cycles, duration, transient)
@@ -271,8 +270,7 @@ class QuantityFunction:
         """
         infos = {info.name: info.unit for info in self._model.manifest.parameters}
         for name, value in parameters.items():
-            if name not in self.wrt:
-                raise RequestError(unknown_name("parameter of this function", name, self.wrt))
+            check_name("parameter of this function", name, self.wrt)
             if wrong := wrong_unit(value, infos[name]):
                 raise RequestError(f"{name}: {wrong}")
         return [parameters.get(name, value) for name, value in zip(self.wrt, self.start.tolist(), strict=True)]
@@ -412,11 +410,6 @@ class QuantityFunction:
 
     def _told(self, row: Array) -> str:
         return _some([f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True)])
-
-
-def _check_word(what: str, given: str, allowed: tuple[str, ...]) -> None:
-    if given not in allowed:
-        raise RequestError(unknown_name(f"choice of {what}", given, allowed))
 
 
 def _some(names: Sequence[str]) -> str:

@@ -13,9 +13,8 @@ from typing import Any, Literal
 from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.dimensions import Identity
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import NOT_INTEGRATED
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import check_name
 from ballpass.runtime.contract.units import printed_unit
 from ballpass.runtime.quantity.values import QuantityValue
 from ballpass.runtime.ratings.elements import element_words
@@ -138,10 +137,8 @@ class SensitivityReport(Reported):
         """
         quantity, parameter = key
         names = [item.name for item in self.quantities]
-        if quantity not in names:
-            raise RequestError(unknown_name("quantity of this report", quantity, names))
-        if parameter not in self.parameters:
-            raise RequestError(unknown_name("parameter of this report", parameter, self.parameters))
+        check_name("quantity of this report", quantity, names)
+        check_name("parameter of this report", parameter, self.parameters)
         return self.pairs[names.index(quantity) * len(self.parameters) + self.parameters.index(parameter)]
 
     def of(self, quantity: str) -> tuple[Sensitivity, ...]:

@@ -236,6 +236,12 @@ def vector(value: object) -> np.ndarray:
         return np.array([math.nan])
 
 
+def check_name(what: str, name: object, known: Iterable[str]) -> None:
+    """Refuse a name that is none of the known ones."""
+    if name not in (names := list(known)):
+        raise RequestError(unknown_name(what, name, names))
+
+
 def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
     """Message for an unknown name: the nearest ones, or all where they are few."""
     names = list(known)

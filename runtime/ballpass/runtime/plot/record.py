@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.ask.observables import turns
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import force_components, table_direction
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import check_name
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
@@ -352,8 +352,7 @@ def bearing_named(manifest: Manifest, name: str) -> BearingInfo:
         raise RequestError(
             f"There is no bearing {name!r}. There are: none, for the only bearing has no name. Omit the name."
         )
-    if name not in known:
-        raise RequestError(unknown_name("bearing", name, known))
+    check_name("bearing", name, known)
     return known[name]
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.contract.parameters import Numbers, real, unknown_name, vector
+from ballpass.runtime.contract.parameters import Numbers, check_name, real, vector
 from ballpass.runtime.contract.refused_scenes import refuse_without_bearings
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
@@ -148,8 +148,7 @@ class StaticEquilibrium(Reported):
         >>> f"{model.static_equilibrium(crank_angle=4.2)['inner.y'] * 1e6:.1f} um"
         '132.2 um'
         """
-        if name not in self.coordinates:
-            raise RequestError(unknown_name("position of this equilibrium", name, self.coordinates))
+        check_name("position of this equilibrium", name, self.coordinates)
         return float(self.positions[self.coordinates.index(name)])
 
     @property
@@ -371,11 +370,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     SimulationError
         Nothing holds the rings.
     """
-    if not model.has("static_forces"):
-        refuse_without_bearings("static_equilibrium", bearings=bool(model.manifest.bearings))
-        raise RequestError(
-            "static_equilibrium: this folder was written by an older version. `ballpass derive SCENE` writes it again."
-        )
+    refuse_without_bearings("static_equilibrium", bearings=bool(model.manifest.bearings))
     half = len(model.states) // 2
     there = point(model, numbers, t, np.zeros(2 * half))
     kernel, slopes = model.kernel("static_forces"), model.kernel("static_forces_jac_x")

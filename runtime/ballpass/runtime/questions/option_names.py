@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.options import Option
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import check_name
 
 Reader = Callable[[Manifest | None, str, Sequence[str]], None]
 
@@ -102,8 +101,7 @@ def states(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> Non
     """States: ``inner.y``."""
     names = [info.name for info in manifest.states] if manifest is not None else texts
     for text in texts:
-        if text not in names:
-            raise RequestError(unknown_name("state", text, names))
+        check_name("state", text, names)
 
 
 def measured(manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:
@@ -162,8 +160,7 @@ def methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> N
 
     known = ("auto", *STEPPERS, *METHODS)
     for text in texts:
-        if text not in known:
-            raise RequestError(unknown_name("method", text, known))
+        check_name("method", text, known)
 
 
 def stepper_methods(_manifest: Manifest | None, _option: str, texts: Sequence[str]) -> None:

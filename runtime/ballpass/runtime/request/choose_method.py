@@ -10,7 +10,7 @@ import warnings
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.method_registry import NOT_INTEGRATED, STEPPERS
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import check_name, unknown_name
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
 
@@ -106,6 +106,5 @@ def choose_method(model: LoadedModel, asked: str, *, stepper: bool = False) -> t
             else f"it needs a C compiler, and none was found. {INSTALL_COMPILER}"
         )
         raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(available)}.")
-    if asked not in available:
-        raise RequestError(unknown_name("method", asked, available))
+    check_name("method", asked, available)
     return asked, "asked for"

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, check_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments, Tangents
 from ballpass.runtime.request.direction_scales import direction_scales
@@ -52,8 +52,7 @@ class Chain:
         self._values = numbers.values
         rows = {name: row for row, name in enumerate(numbers.parameters)}
         for name in names:
-            if name not in rows:
-                raise RequestError(unknown_name("parameter", name, rows))
+            check_name("parameter", name, rows)
         self.names = tuple(names)
         self.p = np.zeros((len(numbers.p), len(names)))
         for column, name in enumerate(names):

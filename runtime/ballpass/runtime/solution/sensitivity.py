@@ -14,7 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, LOOSEST_SENSITIVITY, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, check_name
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.request.choose_method import differentiating_method
@@ -67,10 +67,8 @@ class Sensitivities(ShortRepr):
         """
         state, parameter = key
         states = self.solution.states
-        if state not in states:
-            raise RequestError(unknown_name("state", state, states))
-        if parameter not in self.names:
-            raise RequestError(unknown_name("parameter of this sensitivity", parameter, self.names))
+        check_name("state", state, states)
+        check_name("parameter of this sensitivity", parameter, self.names)
         return np.asarray(self.x[:, states.index(state), self.names.index(parameter)])
 
 
