@@ -7,7 +7,7 @@ in the ring's own coordinates, from where its x axis was at the start.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ballpass.runtime.contract.manifest import FitInfo
 from ballpass.runtime.life.combined_load import CombinedLoad
@@ -190,15 +190,15 @@ class DutyLife(ShortRepr):
     """
 
     name: str
-    hours: float | None
-    turns: float | None
-    modified_hours: float | None
-    modified_turns: float | None
-    mean_load: float | None
-    basic_hours: float | None
-    basic_turns: float | None
-    damage: Mapping[str, float]
-    why_no_life: str
+    hours: float | None = None
+    turns: float | None = None
+    modified_hours: float | None = None
+    modified_turns: float | None = None
+    mean_load: float | None = None
+    basic_hours: float | None = None
+    basic_turns: float | None = None
+    damage: Mapping[str, float] = field(default_factory=dict)
+    why_no_life: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

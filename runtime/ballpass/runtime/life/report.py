@@ -291,18 +291,7 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
     lasting = [(state, bearing) for state, bearing in turning if not bearing.why_no_life]
     if not lasting:
         why = turning[0][1].why_no_life if turning else "Nothing turns in any state."
-        return DutyLife(
-            name=info.name,
-            hours=None,
-            turns=None,
-            modified_hours=None,
-            modified_turns=None,
-            mean_load=None,
-            basic_hours=None,
-            basic_turns=None,
-            damage={},
-            why_no_life=why,
-        )
+        return DutyLife(name=info.name, why_no_life=why)
     shares = [state.share for state, _ in lasting]
 
     def together(of: list[float]) -> tuple[float, float]:
@@ -334,7 +323,6 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         basic_hours=basic[0],
         basic_turns=basic[1],
         damage=damage,
-        why_no_life="",
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
@@ -54,23 +56,15 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)
 
 
-KINDS = (
-    Kind(
-        name="static_deflection",
-        summary="distance of the inner ring's centre from its unloaded place, at rest under the load of one instant",
-        takes="bearing at rest",
-        place=FIRST_TURN,
-        unit="m",
-        check=check_first_turns,
-        at_rest=at_rest,
-    ),
-    Kind(
-        name="static_peak_ball_force",
-        summary="largest elastic force of any ball, at rest under the load of one instant",
-        takes="bearing at rest",
-        place=FIRST_TURN,
-        unit="N",
-        check=check_first_turns,
-        at_rest=at_rest,
-    ),
+_DEFLECTION = Kind(
+    name="static_deflection",
+    summary="distance of the inner ring's centre from its unloaded place, at rest under the load of one instant",
+    takes="bearing at rest",
+    place=FIRST_TURN,
+    unit="m",
+    check=check_first_turns,
+    at_rest=at_rest,
 )
+_FORCE_WORDS = "largest elastic force of any ball, at rest under the load of one instant"
+
+KINDS = (_DEFLECTION, replace(_DEFLECTION, name="static_peak_ball_force", summary=_FORCE_WORDS, unit="N"))

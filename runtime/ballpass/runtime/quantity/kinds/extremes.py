@@ -147,26 +147,36 @@ def _scale(view: View, name: str) -> float:
     return 1.0 if unit == "rad" else abs(view.numbers.parameters[name])
 
 
+def _value_kind(name: str, size: str, words: str, also: tuple[str, ...] = ()) -> Kind:
+    return Kind(
+        name=name,
+        also=also,
+        summary=f"{size} value",
+        words=words,
+        evaluate=lambda view, quantity: _extreme(view, quantity, name),
+        extremes=(name,),
+        reduced=lambda runs, quantity: runs.entry(name, quantity.channel),
+        rows=(name,),
+    )
+
+
+def _time_kind(name: str, of: str, size: str, words: str) -> Kind:
+    return Kind(
+        name=name,
+        summary=f"time of the {size} value",
+        words=f"time of the {words}",
+        unit="s",
+        evaluate=lambda view, quantity: _time(view, quantity, of),
+        extremes=(of,),
+        around=True,
+        reduced=lambda runs, quantity: runs.entry(f"{of}_time", quantity.channel),
+        rows=(of,),
+    )
+
+
 KINDS = (
-    Kind(
-        name="max",
-        also=("peak",),
-        summary="largest value",
-        words="highest",
-        evaluate=lambda view, quantity: _extreme(view, quantity, "max"),
-        extremes=("max",),
-        reduced=lambda runs, quantity: runs.entry("max", quantity.channel),
-        rows=("max",),
-    ),
-    Kind(
-        name="min",
-        summary="smallest value",
-        words="lowest",
-        evaluate=lambda view, quantity: _extreme(view, quantity, "min"),
-        extremes=("min",),
-        reduced=lambda runs, quantity: runs.entry("min", quantity.channel),
-        rows=("min",),
-    ),
+    _value_kind("max", "largest", "highest", also=("peak",)),
+    _value_kind("min", "smallest", "lowest"),
     Kind(
         name="range",
         summary="largest less smallest value",
@@ -175,28 +185,8 @@ KINDS = (
         reduced=_reduced_range,
         rows=("max", "min"),
     ),
-    Kind(
-        name="peak_time",
-        summary="time of the largest value",
-        words="time of the highest",
-        unit="s",
-        evaluate=lambda view, quantity: _time(view, quantity, "max"),
-        extremes=("max",),
-        around=True,
-        reduced=lambda runs, quantity: runs.entry("max_time", quantity.channel),
-        rows=("max",),
-    ),
-    Kind(
-        name="min_time",
-        summary="time of the smallest value",
-        words="time of the lowest",
-        unit="s",
-        evaluate=lambda view, quantity: _time(view, quantity, "min"),
-        extremes=("min",),
-        around=True,
-        reduced=lambda runs, quantity: runs.entry("min_time", quantity.channel),
-        rows=("min",),
-    ),
+    _time_kind("peak_time", "max", "largest", "highest"),
+    _time_kind("min_time", "min", "smallest", "lowest"),
     Kind(
         name="peak_ball",
         summary="number of the ball that has the largest value, counted from 1; 0 for what is of no ball",
