@@ -274,15 +274,9 @@ class Stepper:
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
         keeps = ctypes.c_long(0)
         options = _Options(
-            *(
-                method_numbers().index(method),
-                max_steps,
-                first_step,
-                smallest_step,
-                largest_step,
-                address(tolerance),
-                address(reduction),
-            ),
+            *(method_numbers().index(method), max_steps, first_step, smallest_step, largest_step),
+            tolerance=address(tolerance),
+            reduction=address(reduction),
             before=address(before),
             kept=address(kept),
             keeps=ctypes.addressof(keeps),

@@ -57,22 +57,10 @@ class RatedBall(RatedElement):
         return math.pi / 6.0 * geometry.diameter**3
 
     def dynamic_rating(self, geometry: ElementGeometry) -> Any:
-        return load_ratings.dynamic_rating(
-            geometry.balls,
-            geometry.diameter,
-            geometry.pitch,
-            self._grooves(geometry),
-            cosine=geometry.nominal_cosine,
-        )
+        return load_ratings.dynamic_rating(*self._sizes(geometry), cosine=geometry.nominal_cosine)
 
     def static_rating(self, geometry: ElementGeometry) -> Any:
-        return load_ratings.static_rating(
-            geometry.balls,
-            geometry.diameter,
-            geometry.pitch,
-            self._grooves(geometry),
-            cosine=geometry.nominal_cosine,
-        )
+        return load_ratings.static_rating(*self._sizes(geometry), cosine=geometry.nominal_cosine)
 
     def fatigue_limit(self, static_rating: Any, pitch: Any) -> Any:
         return load_ratings.fatigue_limit(static_rating, pitch)
@@ -102,6 +90,9 @@ class RatedBall(RatedElement):
             raceway_radius=raceway,
             groove_radius=groove * geometry.diameter,
         )
+
+    def _sizes(self, geometry: ElementGeometry) -> tuple[Any, Any, Any, tuple[Any, Any]]:
+        return geometry.balls, geometry.diameter, geometry.pitch, self._grooves(geometry)
 
     def _grooves(self, geometry: ElementGeometry) -> tuple[Any, Any]:
         """Groove radius over ball diameter, inner and outer."""
