@@ -31,12 +31,7 @@ from ballpass.runtime.certify.derivative_runs import derivative_run, differentia
 from ballpass.runtime.certify.dimensions import BASES, Identity, identities, power
 from ballpass.runtime.certify.grazing import Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
-from ballpass.runtime.certify.sensitivity_report import (
-    STEPS,
-    Sensitivity,
-    SensitivityReport,
-    ratio_unit,
-)
+from ballpass.runtime.certify.sensitivity_report import STEPS, Sensitivity, SensitivityReport, ratio_unit
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real

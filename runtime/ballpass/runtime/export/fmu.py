@@ -35,20 +35,8 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
 from ballpass.runtime.export.fmi2_description import fmi2_description
-from ballpass.runtime.export.model_description import (
-    SPEED,
-    build_description,
-    experiment,
-    model_description,
-)
-from ballpass.runtime.export.scene_numbers import (
-    MOMENT,
-    behind,
-    computed_outputs,
-    filled,
-    speed_table,
-    varying,
-)
+from ballpass.runtime.export.model_description import SPEED, build_description, experiment, model_description
+from ballpass.runtime.export.scene_numbers import MOMENT, behind, computed_outputs, filled, speed_table, varying
 from ballpass.runtime.export.targets import TARGETS, cross_compiled, targets_of
 from ballpass.runtime.native.compile import library_suffix
 from ballpass.runtime.native.compilers import need_compiler, run_compiler

@@ -8,17 +8,7 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.plot import PAPER
 from ballpass.runtime.plot.record import Array, Record
-from ballpass.runtime.plot.style import (
-    FIRST,
-    GREY,
-    INK,
-    SECOND,
-    frame,
-    legend_above,
-    new_figure,
-    shade_windows,
-    styled,
-)
+from ballpass.runtime.plot.style import FIRST, GREY, INK, SECOND, frame, legend_above, new_figure, shade_windows, styled
 from ballpass.runtime.time.turning import past
 
 #: Part of the turns in the enlarged panel of ball loads, and part of the time below which high loads are rare.

@@ -19,14 +19,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import DEFLECTION, EQUAL, reduction_rows
 from ballpass.runtime.quantity.between_nodes import Wanted, find_extremes
-from ballpass.runtime.quantity.cuts import (
-    Angles,
-    crossings,
-    find_passages,
-    jumps_at,
-    rank_differences,
-    window_angles,
-)
+from ballpass.runtime.quantity.cuts import Angles, crossings, find_passages, jumps_at, rank_differences, window_angles
 from ballpass.runtime.quantity.location import place_of, place_slope
 from ballpass.runtime.quantity.nodes import Cause, Cuts, Nodes, fixed_nodes, part_of_nodes, scheduled_cuts
 from ballpass.runtime.quantity.panels import (

@@ -6,15 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ballpass.runtime.contract.options import (
-    Check,
-    Cycles,
-    Duration,
-    Option,
-    SensitivityRtol,
-    TightRtol,
-    Transient,
-)
+from ballpass.runtime.contract.options import Check, Cycles, Duration, Option, SensitivityRtol, TightRtol, Transient
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.show.progress import shown_steps

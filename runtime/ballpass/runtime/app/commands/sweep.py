@@ -14,12 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import (
-    asked_of,
-    read_asked,
-    read_formats,
-    read_with_settings,
-)
+from ballpass.runtime.app.commands.load_scene import asked_of, read_asked, read_formats, read_with_settings
 from ballpass.runtime.app.commands.shared import (
     can_draw,
     command,
