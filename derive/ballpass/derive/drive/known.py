@@ -76,14 +76,7 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     if driver.swing is not None:
         return _swinging(driver, driver.swing)
     body, first_angle = "the driven body", symbol_of(driver.start_angle)
-    turning = TurningInfo(
-        name="driver",
-        kind="driver",
-        words="the driver",
-        offset=driver.start_angle.path,
-        rate=driver.speed.path,
-        speeds=(driver.speed.path,),
-    )
+    turning = _even_turning("driver", driver.start_angle.path, driver.speed.path)
     if driver.table is None:
         return _at_constant_speed(turning, body, DRIVER_ANGLE, (r"\theta_1", r"\theta_{1,0}"), first_angle)
     speeds = (driver.speed, *driver.table.later_speed)
@@ -118,19 +111,17 @@ def known_drive(driver: Driver, *, alone: bool = False) -> KnownDrive:
     )
 
 
+def _even_turning(name: str, offset: str, rate: str) -> TurningInfo:
+    """Driver or shaft at one speed; `offset` and `rate` name its angle at the start and its speed."""
+    return TurningInfo(name=name, kind="driver", words=f"the {name}", offset=offset, rate=rate, speeds=(rate,))
+
+
 def _swinging(driver: Driver, amplitude: SceneNumber) -> KnownDrive:
     """Drive of a driver that swings: its phase turns evenly, and what turns with a driver follows the phase."""
     words, body = "the phase of the driver's swing", "the driven body"
     rate = defined("driver.swing.rate", 2 * sp.pi * symbol_of(driver.speed), "rad/s", f"Rate of {words}", r"\omega_1")
     zero = defined("driver.swing.start", sp.S.Zero, "rad", "Phase of the driver's swing at t = 0", r"\theta_{1,0}")
-    turning = TurningInfo(
-        name="driver",
-        kind="driver",
-        words="the driver",
-        offset=zero.symbol.name,
-        rate=rate.symbol.name,
-        speeds=(rate.symbol.name,),
-    )
+    turning = _even_turning("driver", zero.symbol.name, rate.symbol.name)
     drive = _at_constant_speed(turning, words, DRIVER_ANGLE, (r"\varphi_1", r"\varphi_{1,0}"), zero.symbol)
     most, cos, sin = symbol_of(amplitude), sp.cos(DRIVER_ANGLE), sp.sin(DRIVER_ANGLE)
     turned_to = symbol_of(driver.start_angle) + most * sin
@@ -161,14 +152,7 @@ def shaft_drive(shaft: Shaft, *, angle_used: bool) -> KnownDrive:
     angle_used : whether a load follows it; balls know their own
     """
     zero = defined("shaft.start_angle", sp.S.Zero, "rad", "Angle of the shaft at t = 0", r"\theta_s")
-    turning = TurningInfo(
-        name="shaft",
-        kind="driver",
-        words="the shaft",
-        offset=zero.symbol.name,
-        rate=shaft.speed.path,
-        speeds=(shaft.speed.path,),
-    )
+    turning = _even_turning("shaft", zero.symbol.name, shaft.speed.path)
     angle = sp.Symbol("shaft.angle", real=True)
     drive = _at_constant_speed(turning, "the shaft", angle, (r"\theta", r"\theta_0"), zero.symbol)
     if not angle_used:

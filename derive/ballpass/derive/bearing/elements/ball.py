@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import sympy as sp
 
 from ballpass.derive.bearing.elements import hertz
-from ballpass.derive.bearing.elements.element import (
-    RollingElement,
-    compliance,
-    raceway_radius,
-    scaled,
-)
+from ballpass.derive.bearing.elements.element import RollingElement, compliance, raceway_radius, scaled
 from ballpass.derive.scene.bearing_records import GivenContact, HertzContact
 from ballpass.derive.scene.designations import GROOVES
 from ballpass.derive.scene.units import QuantityError, parse_quantity

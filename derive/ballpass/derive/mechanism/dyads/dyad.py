@@ -340,6 +340,19 @@ def name_travels(
     )
 
 
+def name_crossing(
+    ledger: Ledger, inner: Joint, guides: tuple[Joint, Joint], directions: tuple[Pair, Pair]
+) -> tuple[sp.Expr, Margin]:
+    """Name the sine of the angle from one guide to another [1], which is zero where they are parallel; its margin."""
+    words = f"guide {guides[0].name} to guide {guides[1].name}"
+    latex = rf"\Delta_{{{subscript(inner.name)}}}"
+    sine = ledger.define(
+        f"joint.{inner.name}.determinant", cross(*directions), "1", f"sine of the angle from {words}", latex
+    )
+    words = f"squared sine of the angle between guides {guides[0].name} and {guides[1].name}"
+    return sine, Margin(joint=inner.name, expression=sine**2, description=words)
+
+
 def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> Pair:
     """Name the right-hand side of the loop closure's derivative."""
     return ledger.name_pair(

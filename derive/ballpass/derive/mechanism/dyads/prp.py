@@ -12,9 +12,9 @@ from typing import ClassVar
 from ballpass.derive.mechanism.balance import Balance, Guide
 from ballpass.derive.mechanism.dyads.dyad import (
     Dyad,
-    Margin,
     Placement,
     guide_axis,
+    name_crossing,
     name_direction,
     name_gap,
     name_path,
@@ -27,7 +27,6 @@ from ballpass.derive.mechanism.kinematics import (
     Pose,
     add,
     carried,
-    cross,
     displaced,
     dot,
     joint_point,
@@ -35,7 +34,6 @@ from ballpass.derive.mechanism.kinematics import (
     place,
     quarter_turn,
     scale,
-    subscript,
     subtract,
 )
 from ballpass.derive.scene.records import Mechanism
@@ -70,13 +68,7 @@ class PRP(Dyad):
             name_direction(ledger, guide, host.rotate(guide_axis(guide)))
             for guide, host in zip(outer, hosts, strict=True)
         )
-        determinant = ledger.define(
-            f"joint.{inner.name}.determinant",
-            cross(one, two),
-            "1",
-            f"sine of the angle from guide {outer[0].name} to guide {outer[1].name}",
-            rf"\Delta_{{{subscript(inner.name)}}}",
-        )
+        determinant, margin = name_crossing(ledger, inner, outer, (one, two))
         both = ((outer[0], bodies[0], one), (outer[1], bodies[1], scale(-1, two)))
 
         # base1 + s1 t1 = base2 + s2 t2, differentiated; cross products with t2 and t1.
@@ -112,11 +104,7 @@ class PRP(Dyad):
                 Guide(joint=guide, host=host.body, slider=body, direction=direction, travel=travel)
                 for guide, host, body, direction, travel in zip(outer, hosts, bodies, (one, two), travels, strict=True)
             ),
-            margin=Margin(
-                joint=inner.name,
-                expression=determinant**2,
-                description=f"squared sine of the angle between guides {outer[0].name} and {outer[1].name}",
-            ),
+            margin=margin,
         )
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:

@@ -13,9 +13,9 @@ from typing import ClassVar
 from ballpass.derive.mechanism.balance import Balance, Guide
 from ballpass.derive.mechanism.dyads.dyad import (
     Dyad,
-    Margin,
     Placement,
     guide_axis,
+    name_crossing,
     name_direction,
     name_gap,
     name_hinge,
@@ -29,7 +29,6 @@ from ballpass.derive.mechanism.kinematics import (
     Pose,
     add,
     carried,
-    cross,
     dot,
     joint_point,
     place,
@@ -60,7 +59,7 @@ class RPP(Dyad):
     def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Position by both guides' components of the way to the hinge, rates by the same of its derivatives."""
         slot, (block, yoke), (hinge_joint, guide_joint) = self.inner, self.bodies, self.outer
-        host, prefix = poses[self.hosts[1]], f"joint.{slot.name}"
+        host = poses[self.hosts[1]]
         hinge = name_hinge(ledger, mechanism, hinge_joint, poses[self.hosts[0]], play)
         pin, shoe = (joint_point(mechanism, joint, block) for joint in (hinge_joint, slot))
         rail, foot = (joint_point(mechanism, joint, yoke) for joint in (slot, guide_joint))
@@ -71,13 +70,7 @@ class RPP(Dyad):
             name_direction(ledger, joint, host.rotate(axis))
             for joint, axis in zip((slot, guide_joint), axes, strict=True)
         )
-        determinant = ledger.define(
-            f"{prefix}.determinant",
-            cross(*axes),
-            "1",
-            f"sine of the angle from guide {slot.name} to guide {guide_joint.name}",
-            rf"\Delta_{{{subscript(slot.name)}}}",
-        )
+        determinant, margin = name_crossing(ledger, slot, (slot, guide_joint), axes)
         both = ((slot, block, along), (guide_joint, yoke, way))
 
         # base + s1 t1 + s2 t2 = P, seen from the host; cross products with t2 and t1.
@@ -109,11 +102,7 @@ class RPP(Dyad):
                 Guide(joint=slot, host=yoke, slider=block, direction=along, travel=travels[0]),
                 Guide(joint=guide_joint, host=host.body, slider=yoke, direction=way, travel=travels[1]),
             ),
-            margin=Margin(
-                joint=slot.name,
-                expression=determinant**2,
-                description=f"squared sine of the angle between guides {slot.name} and {guide_joint.name}",
-            ),
+            margin=margin,
         )
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
