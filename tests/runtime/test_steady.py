@@ -329,7 +329,7 @@ phase = "0 deg"
 [bearing]
 """
     model = make_model("rotor", ("[bearing]\n", load))
-    with pytest.raises(RequestError, match=r"loads.harmonic.frequency: at its first end .* no period holds between"):
+    with pytest.raises(RequestError, match=r"loads.harmonic.frequency: at the first end .* no period holds between"):
         model.steady(over="loads.harmonic.frequency=50 Hz:100 Hz", parameters=THREE_EIGHTHS)
     read = model.bifurcation(
         "loads.harmonic.frequency=50 Hz:100 Hz:2", parameters=THREE_EIGHTHS, readings=20, settling=0, exponent=False

@@ -18,7 +18,9 @@ from stepper_runs import edges_of, run, segments_between
 from ballpass.runtime import IntegrationError, Model, RequestError, Status
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.native import stepper as stepping
-from ballpass.runtime.native.stepper import NAMES, End, Segments, Stepper
+from ballpass.runtime.native.stepper import End, Segments, Stepper, method_numbers
+
+NAMES = method_numbers()
 
 TURN = 2.0 * np.pi
 

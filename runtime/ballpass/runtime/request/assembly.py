@@ -210,7 +210,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers, end: float = math.inf) 
                 + f"\nIt is valid from {what} {first:.4f} to {last:.4f} deg.{turns} Change the lengths of the bodies "
                 "that meet at the joint, or ask for a time in which the driver stays between these angles."
             )
-    for constant in manifest.constants:
+    for constant in () if np.isfinite(numbers.c).all() else manifest.constants:
         if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
             body = constant.name.removeprefix("body.").removesuffix(".turns")
             if ends is not None:
