@@ -14,7 +14,8 @@ from typer.testing import CliRunner, Result
 
 from ballpass.derive import generate, read_scene
 from ballpass.runtime import RequestError, load_solution
-from ballpass.runtime.app.cli import ASK, DESCRIBE, SIMULATE, app
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.command_list import COMMANDS
 from ballpass.runtime.app.commands.data_set_spec import read_spec
 from ballpass.runtime.contract.extras import need
 
@@ -212,7 +213,7 @@ def test_help_groups_all_commands_in_80_columns() -> None:
     lines = done.stdout.splitlines()
     assert max(map(len, lines)) <= 80
     heads = [line.strip("╭─╮ ") for line in lines if line.startswith("╭")]
-    assert heads == ["Options", DESCRIBE, SIMULATE, ASK]  # none is left over in "Commands"
+    assert heads == ["Options", *COMMANDS, "For agents"]  # none is left over in "Commands"
 
 
 def test_a_missing_scene_that_comes_with_ballpass_is_named_with_the_command_that_copies_it(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ OPTION = re.compile(r"--[a-z][a-z-]*")
 def sections() -> dict[str, str]:
     """Text of the page's sections by command."""
     _, *parts = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    named = {match[1]: part for part in parts if (match := re.match(r"`ballpass ([a-z]+) ", part))}
+    named = {match[1]: part for part in parts if (match := re.match(r"`ballpass ([a-z]+)[ `]", part))}
     assert len(named) == sum(part.startswith("`ballpass ") for part in parts)
     return named
 

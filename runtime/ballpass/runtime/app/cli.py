@@ -6,34 +6,19 @@ codes: 0 done, 1 the computation failed, 2 the request was wrong, 130 interrupte
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from ballpass.runtime.app.commands.animate import animate
-from ballpass.runtime.app.commands.bearings import bearings
-from ballpass.runtime.app.commands.dataset import dataset
+from ballpass.runtime.app.commands.command_list import ASK, COMMANDS
 from ballpass.runtime.app.commands.declared import Command, Plugins, as_command, question_command
-from ballpass.runtime.app.commands.derive import derive, equations
-from ballpass.runtime.app.commands.explain import explain
-from ballpass.runtime.app.commands.explore import explore
-from ballpass.runtime.app.commands.export import export
-from ballpass.runtime.app.commands.new import new
-from ballpass.runtime.app.commands.run import run
-from ballpass.runtime.app.commands.schema import schema
-from ballpass.runtime.app.commands.select import select
+from ballpass.runtime.app.commands.mcp import mcp
 from ballpass.runtime.app.commands.shared import command, complain
-from ballpass.runtime.app.commands.stream import stream
-from ballpass.runtime.app.commands.sweep import sweep
-from ballpass.runtime.app.commands.trade import trade
+from ballpass.runtime.app.commands.skill import skill
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.questions import QUESTIONS, added_questions
+from ballpass.runtime.questions import added_questions
 from ballpass.runtime.questions.question import declared
-
-#: Groups of commands in ``ballpass --help``, in this order.
-DESCRIBE, SIMULATE, ASK = "From scene to equations", "Simulate and export", "Ask of a scene"
 
 #: Names that are looked for, and the commands that do it.
 MEANT = {"simulate": "run", "solve": "run", "fmu": "export --fmu"}
@@ -59,7 +44,7 @@ class Commands(TyperGroup):
         if cmd_name not in found:
             return None
         extra = typer.Typer(add_completion=False)
-        extra.command(cmd_name, cls=Command, rich_help_panel=ASK)(question_command(found[cmd_name]))
+        extra.command(cmd_name, cls=Command, rich_help_panel=ASK)(as_command(question_command(found[cmd_name])))
         return typer.main.get_command(extra)
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -96,12 +81,6 @@ def _common(
     """Options of `ballpass` itself; the commands have their own."""
 
 
-for _panel, _commands in {
-    DESCRIBE: (new, derive, equations, bearings, explain, schema),
-    SIMULATE: (run, export, animate, explore, dataset, stream, sweep),
-}.items():
-    for _command in _commands:
+for _panel, _commands in {**COMMANDS, "For agents": {"mcp": mcp, "skill": skill}}.items():
+    for _command in _commands.values():
         app.command(cls=Command, rich_help_panel=_panel)(as_command(_command))
-_ASKED: tuple[Callable[..., Any], ...] = (*QUESTIONS, select, trade)
-for _question in _ASKED:
-    app.command(cls=Command, rich_help_panel=ASK)(question_command(_question))

@@ -31,10 +31,11 @@ from ballpass.runtime.certify.derivative_runs import derivative_run, differentia
 from ballpass.runtime.certify.dimensions import BASES, Identity, identities, power
 from ballpass.runtime.certify.grazing import Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
-from ballpass.runtime.certify.sensitivity_report import STEPS, Sensitivity, SensitivityReport, ratio_unit
+from ballpass.runtime.certify.sensitivity_report import STEPS, Sensitivity, SensitivityReport
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
+from ballpass.runtime.contract.units import ratio_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import DEFLECTION
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
@@ -223,6 +224,8 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     parameter=name,
                     value=estimate.value,
                     parameter_value=at,
+                    quantity_unit=quantity.unit,
+                    parameter_unit=units[name],
                     derivative=derivative,
                     unit=ratio_unit(quantity.unit, units[name]),
                     dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
@@ -256,6 +259,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             "agreement": query.agreement,
             "steps": course.steps,
             "parameters": {name: numbers.parameters[name] for name in names},
+            "units": {name: units[name] for name in names},
         },
         elements=tuple(bearing.element for bearing in manifest.bearings),
     )

@@ -45,7 +45,7 @@ class Sensitivity:
     Attributes
     ----------
     quantity, parameter : names
-    value, parameter_value : numbers
+    value, parameter_value, quantity_unit, parameter_unit : numbers and their units
     derivative, unit : dQ/dp, by the route that is known better; NaN where nothing is known: neither is verified, and
         they have no digit in common
     dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
@@ -62,6 +62,8 @@ class Sensitivity:
     parameter: str
     value: float
     parameter_value: float
+    quantity_unit: str
+    parameter_unit: str
     derivative: float
     unit: str
     dimensionless: float
@@ -180,7 +182,9 @@ class SensitivityReport(Reported):
                 "sensitivities": [known | _facts(pair) for pair, known in pairs],
                 "identities": [asdict(one) | {"holds": one.holds} for one in self.identities],
                 "grazing": [
-                    {name: value for name, value in asdict(item).items() if name != "bearing"} for item in self.grazing
+                    {name: value for name, value in asdict(item).items() if name != "bearing"}
+                    | {"units": {"ball": "1", "depth": "m" if item.kink == "contact" else "m/s"}}
+                    for item in self.grazing
                 ],
             },
             records=[known | {"verdict": pair.check.verdict.value} for pair, known in pairs],
@@ -205,11 +209,14 @@ def _facts(pair: Sensitivity) -> dict[str, Any]:
     """Texts of a pair in the JSON, beside its numbers."""
     check = pair.check
     return {
+        "units": dict.fromkeys(("value", "change_per_scale"), pair.quantity_unit)
+        | dict.fromkeys(("parameter_value", "parameter_scale"), pair.parameter_unit),
         "parameter_scale": pair.scale,
         "change_per_scale": pair.change,
         "route": pair.route,
         "by_steps": pair.by_steps,
         "certificate": {
+            "units": {"value": pair.unit},
             "route": check.route,
             "value": check.value,
             "uncertainty": check.uncertainty,
@@ -222,14 +229,6 @@ def _facts(pair: Sensitivity) -> dict[str, Any]:
             "slopes_at_kink": check.sides,
         },
     }
-
-
-def ratio_unit(above: str, below: str) -> str:
-    """Unit of a derivative."""
-    if below in ("", "1"):
-        return above or "1"
-    under = f"({below})" if any(sign in below for sign in "*/") else below
-    return f"{above or '1'}/{under}"
 
 
 def _rank(pair: Sensitivity) -> tuple[bool, float]:

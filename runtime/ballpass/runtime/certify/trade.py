@@ -169,6 +169,7 @@ def measure_trade(
         cycles=turns,
         measured=tuple(_summary(way, errors[k], times[k], known, names) for k, way in enumerate(ways)),
         meanings={item.name: quantity_words(model.manifest, item) for item in compared},
+        units={item.name: item.unit for item in compared},
     )
 
 

@@ -58,6 +58,7 @@ class Trade(Reported):
     spread : half the width of the interval they are drawn from [1]
     cycles : turns of a run
     measured : all ways
+    units : of the quantities, by name
     """
 
     scene: str
@@ -70,6 +71,7 @@ class Trade(Reported):
     cycles: float
     measured: tuple[Measured, ...]
     meanings: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (
@@ -102,7 +104,11 @@ class Trade(Reported):
             for one in self.measured
         ]
         said = words(self)
-        return Report(parts=(best, *said), facts={"trade": asdict(self), "words": said}, records=records)
+        return Report(
+            parts=(best, *said),
+            facts={"trade": asdict(self), "words": said, "units": {"uncertainty": "1"}},
+            records=records,
+        )
 
     def front(self, quantity: str | None = None) -> tuple[Measured, ...]:
         """Ways that no other beats in both error and time, from cheap to accurate."""

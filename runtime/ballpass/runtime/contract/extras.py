@@ -13,6 +13,7 @@ EXTRAS = {
     "dask": ("Dask", "scale"),
     "jax": ("JAX", "jax"),
     "matplotlib": ("matplotlib", "figures"),
+    "mcp": ("the MCP SDK", "mcp"),
     "pandas": ("pandas", "labelled"),
     "scipy": ("SciPy", "analysis"),
     "torch": ("PyTorch", "torch"),

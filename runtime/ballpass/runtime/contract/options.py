@@ -40,6 +40,7 @@ class Option:
     names : where its texts name something of a model: raises `RequestError` for what the manifest does not have, and
         without a manifest for what no scene has; called with the manifest or None, the parameter's name, the texts
     positional : whether it stands by its place on the command line, without a flag
+    complete : the texts that begin with one, for completion in a shell
     """
 
     words: str
@@ -54,6 +55,7 @@ class Option:
     reader: Callable[[str], Any] | None = None
     names: Callable[[Manifest | None, str, Sequence[str]], object] | None = None
     positional: bool = False
+    complete: Callable[[str], list[str]] | None = None
 
     def flag(self, name: str) -> str:
         """Flag of a parameter on the command line; its placeholder where it has none."""
@@ -78,7 +80,7 @@ class Option:
         wanted = type_fault(name, kind.__name__ if isinstance(kind, type) else str(kind), value)
         if wanted is not None:
             return wanted
-        choices = self.choices or _literals(kind)
+        choices = self.choices or literals(kind)
         if choices and (value is not None or type(None) not in get_args(kind)):
             several = is_of(kind, Sequence) and isinstance(value, Iterable) and not isinstance(value, str)
             wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in choices]
@@ -174,7 +176,7 @@ def refuse_unknown(
         raise RequestError("\n".join(faults))
 
 
-def _literals(kind: Any) -> tuple[str, ...]:
+def literals(kind: Any) -> tuple[str, ...]:
     """The words of a `Literal`, also of one that may be None."""
     return tuple(
         word

@@ -456,3 +456,11 @@ def _quoted(example: str, unit: str) -> str:
 def _type_name(given: object) -> str:
     names = {"dict": "a table", "list": "a list", "datetime": "a date", "date": "a date", "time": "a time of day"}
     return names.get(type(given).__name__, "something else")
+
+
+def ratio_unit(above: str, below: str) -> str:
+    """Unit of a derivative."""
+    if below in ("", "1"):
+        return above or "1"
+    under = f"({below})" if any(sign in below for sign in "*/") else below
+    return f"{above or '1'}/{under}"

@@ -267,7 +267,7 @@ class FitAnswer(ShortRepr, Reported):
                 }
                 for one in self.signals
             ],
-            "starts": [{"start": list(start), "end": end} for start, end in self.starts],
+            "starts": [{"start": list(start), "end": end, "units": {"end": "1"}} for start, end in self.starts],
             **self._named("rivals", "loss", "profile", "rtol", "converged", "notes"),
         }
         fault = "" if self.converged else "The search did not end by itself. Give narrower bounds or more starts."

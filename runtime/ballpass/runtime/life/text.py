@@ -79,6 +79,8 @@ class LifeReport(Reported):
             for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
                 entry["hours"] = None if bearing.life is None else bearing.hours(bearing.life)
                 lives = {name: math.nan if entry[name] is None else entry[name] for name in ("life", "hours")}
+                if bearing.oscillation is not None:
+                    entry["oscillation"]["units"] = {"life": "1", "load": "N", "amplitude": "rad"}
                 forces = {name: entry[name] for name in ("peak_force", "static_safety")}
                 pressure = max(bearing.inner.peak_pressure, bearing.outer.peak_pressure)
                 names = {"state": state.name, "bearing": bearing.name}

@@ -183,6 +183,7 @@ class Explanation(ShortRepr, Reported):
             **self._named("turn", "turns"),
             "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in self.smoothness],
             "time_scales": scales,
+            "units": {"frequency": "rad/s", "levers": "1"},
             "without_equilibrium": self.unsupported,
             "method": {"auto": self.method, "reason": self.reason},
             "levers": dict(self.levers),

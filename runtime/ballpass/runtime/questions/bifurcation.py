@@ -169,6 +169,7 @@ class Bifurcation(ShortRepr, Reported):
         facts = {
             "vary": self.vary.name,
             "vary_unit": self.vary.unit,
+            "units": dict.fromkeys(("value", "apart"), self.vary.unit),
             **self._named("state", "unit", "every", "apart"),
             "motions": records,
         }

@@ -16,7 +16,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Transient
-from ballpass.runtime.contract.units import printed_unit, table_unit
+from ballpass.runtime.contract.units import printed_unit, ratio_unit, table_unit
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
@@ -185,6 +185,7 @@ class Optimum(ShortRepr, Reported):
                 "value": value,
                 "bound": bound,
                 "slopes": self.slopes[:, k].tolist(),
+                "units": {"slopes": ratio_unit(self.unit, one.unit)},
             }
             for k, (one, value, bound) in enumerate(zip(self.vary, self.x.tolist(), self.bounds, strict=True))
         ]

@@ -175,6 +175,7 @@ class PoincareSection(ShortRepr, Reported):
             **self._named("angle", "turns", "around", "others", "kind", "period", "motion", "every"),
             "drift": self.curve.drift if self.curve is not None else None,
             "harmonics": self.curve.harmonics if self.curve is not None else None,
+            "units": {"angle": "deg", "period": "turns", "points": "SI"},
             "states": records,
             "phase": self.phase.tolist(),
             "points": self.states.tolist(),

@@ -222,7 +222,7 @@ class SobolAnswer(DrawnAnswer):
         facts = {
             **self._named("inputs", "distributions"),
             "quantities": [asdict(one) for one in self.quantities],
-            "limits": [asdict(one) for one in self.limits],
+            "limits": [asdict(one) | {"units": {"low": "1", "high": "1"}} for one in self.limits],
             **self._named("samples", "seed", "members", "failed"),
             "first_fault": self.fault,
         }

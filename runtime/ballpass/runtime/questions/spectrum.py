@@ -244,6 +244,7 @@ class SignalSpectrum(ShortRepr, Reported):
             ],
             "lines": rows,
             "notes": list(self.notes),
+            "units": {"resolution": "Hz"},
             "figure": None,  # the command puts the file here
         }
         return Report(

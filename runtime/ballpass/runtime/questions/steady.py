@@ -235,6 +235,7 @@ class SteadyState(ShortRepr, Reported):
             **self._named("left", "segments", "integrated", "difference"),
             "over": self.over.name if self.over else None,
             "over_unit": self.over.unit if self.over else None,
+            "units": {} if self.over is None else dict.fromkeys(("value", "between"), self.over.unit),
             "branches": [branch_facts(branch) for branch in self.branches],
         }
         return Report(parts=parts, facts=facts, records=rows, index=("state",), warnings=warnings)

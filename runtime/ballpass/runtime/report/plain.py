@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.report.report import Report
+from ballpass.runtime.report.units import with_units
 
 if TYPE_CHECKING:
     import pandas
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 def to_plain(report: Report) -> dict[str, Any]:
     """Mappings, lists, texts and finite numbers; numbers that are not finite are None."""
-    found: dict[str, Any] = finite(dict(report.facts))
+    found: dict[str, Any] = finite(with_units(report.facts))
     return found
 
 

@@ -13,6 +13,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.ratings import tolerances
 from ballpass.runtime.report.report import ReportTable, Words
+from ballpass.runtime.report.units import with_units
 
 
 def bearings(
@@ -44,7 +45,7 @@ def bearings(
                 f"There are {len(types)}, from {next(iter(types))} to {list(types)[-1]}: `ballpass bearings`."
             )
         if json_:
-            show_json({"bearings": found})
+            show_json(with_units({"bearings": found}))
             return
         fits: dict[str, Callable[[dict[str, Any]], Words]] = {
             f">{name}": lambda row, name=name: _ends(row["interference"].get(name))  # type: ignore[misc]

@@ -14,6 +14,7 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import Stages, check_folder, command, complain, show, show_json, warn
 from ballpass.runtime.contract.options import Option
+from ballpass.runtime.report.units import with_units
 
 if TYPE_CHECKING:
     from ballpass.runtime.app.commands.data_set_spec import ClassSpec
@@ -73,7 +74,8 @@ def dataset(
             )
     failed = [{"member": one.member, "status": one.status, "message": one.message} for one in report.failures]
     if json_:
-        show_json({"path": str(report.path), "members": report.members, "made": report.made, "failures": failed})
+        made = {"path": str(report.path), "members": report.members, "made": report.made, "failures": failed}
+        show_json(with_units(made))
     else:
         show(f"{report.path}: {report.members} members, {report.made} made now, {len(failed)} without a signal")
     for one in report.failures[:NAMED]:

@@ -88,10 +88,17 @@ class Command(TyperCommand):
             raise typer.Exit(2) from None
 
 
-def as_command(function: Callable[..., None]) -> Callable[..., None]:
-    """The command of a function; typer's own options among its parameters stay as they are."""
+def parameters_of(
+    function: Callable[..., None],
+) -> tuple[Mapping[str, inspect.Parameter], dict[str, tuple[Any, Option]]]:
+    """The parameters of a command, and the type and the option of each."""
     own = inspect.signature(function, eval_str=True).parameters
-    kinds = options_in({name: item.annotation for name, item in own.items()})
+    return own, options_in({name: item.annotation for name, item in own.items()})
+
+
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """The command of a function whose parameters are options."""
+    own, kinds = parameters_of(function)
     required = [name for name in kinds if own[name].default is inspect.Parameter.empty]
 
     def call(plugin: object = None, **given: Any) -> None:
@@ -100,13 +107,13 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
             values = _read(kinds, given)
         function(**{**given, **values})
 
-    parameters = [_typer_option(item, *kinds[name]) if name in kinds else item for name, item in own.items()]
+    parameters = [_typer_option(item, *kinds[name]) for name, item in own.items()]
     parameters.append(_parameter("plugin", Plugins, None))
     return _with_signature(call, function.__name__, function.__doc__ or "", parameters)
 
 
 def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
-    """The command of a question: a scene, the question's options, and the options of the report."""
+    """The function of a question's command: a scene, the question's options, and the options of the report."""
     question, kinds = declared(ask), options_of(ask)
     own = inspect.signature(ask).parameters
     parameters = [
@@ -127,7 +134,7 @@ def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
         values = {name: given.pop(name) for name in kinds}
         _ask(ask, question, values, **given)
 
-    return as_command(_with_signature(call, question.name, summary_of(ask), parameters))
+    return _with_signature(call, question.name, summary_of(ask), parameters)
 
 
 def _refuse_missing(missing: Mapping[str, Option]) -> None:
@@ -189,7 +196,9 @@ def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> in
     elif option.unit or option.reader:
         kind = str if required else str | None
     if option.positional:
-        argument = typer.Argument(metavar=option.shown, help=option.words, show_default=False)
+        argument = typer.Argument(
+            metavar=option.shown, help=option.words, show_default=False, autocompletion=option.complete
+        )
         return parameter.replace(annotation=Annotated[kind, argument])
     flags = option.flags or (option.flag(parameter.name),)
     words = option.help(parameter.name)
@@ -238,7 +247,7 @@ def _ask(
             values["progress"] = _progress(stages)
         if "scene" in ask.__annotations__:
             values["scene"] = scene
-        asked = _request(question, model, values, overrides)
+        asked = _request(ask, model, values, overrides)
         if "keep" in ask.__annotations__ and folder is not None:
             values["keep"] = folder / f"{question.name}.parts"
         answer, report, apart = _answered(ask, question, model, values, overrides)
@@ -293,18 +302,20 @@ def _answered(
 
 
 def _request(
-    question: Question, model: Any, values: Mapping[str, Any], overrides: Mapping[str, float]
+    ask: Callable[..., Any], model: Any, values: Mapping[str, Any], overrides: Mapping[str, float]
 ) -> dict[str, Any]:
     """What repeats an answer: command, scene, version, options and overrides, SI."""
     given = {name: value for name, value in values.items() if value is not None and not callable(value)}
     return {
-        "command": question.name,
+        "command": declared(ask).name,
         "scene": model.manifest.scene,
         "source": model.manifest.source,
         "signature": model.manifest.signature,
         "version": __version__,
         "options": json.loads(json.dumps(given, default=str)),
         "parameters": dict(overrides),
+        "units": {info.name: info.unit for info in model.manifest.parameters if info.name in overrides}
+        | {name: option.unit or "1" for name, (_, option) in options_of(ask).items() if name in given},
     }
 
 

@@ -13,6 +13,7 @@ from ballpass.runtime.app.commands.shared import command, load_model, show_json
 from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report
+from ballpass.runtime.report.units import with_units
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -48,7 +49,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
         said = model.explain(overrides)
     report = _report(scene, read, counted, said, model.manifest)
     if json_:
-        show_json(report)
+        show_json(with_units(report))
     else:
         show_report(_render(report, said))
 

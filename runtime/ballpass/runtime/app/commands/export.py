@@ -46,7 +46,7 @@ def export(
         int | None, Option(shown="VERSION", words="Write an FMU of this version of the FMI, 2 or 3; 3 if not given.")
     ] = None,
     inputs: Annotated[
-        list[str] | None,
+        Sequence[str] | None,
         Option(
             shown="NAME",
             words="A load, force, torque or speed that is an input of the FMU, by its parameter name or the beginning "
@@ -55,7 +55,7 @@ def export(
         ),
     ] = None,
     target: Annotated[
-        list[str] | None,
+        Sequence[str] | None,
         Option(
             shown="SYSTEM",
             words="Compile for this system too: `linux`, `windows`, `macos`, or one kind of machines of it such as "

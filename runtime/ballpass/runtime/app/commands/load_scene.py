@@ -71,7 +71,7 @@ def generated_folder(scene: Path) -> Path:
 
 def read_asked(
     path: Path,
-    settings: list[str] | None,
+    settings: Sequence[str] | None,
     cycles: float | None = None,
     duration: float | None = None,
     transient: float | None = None,
@@ -99,7 +99,7 @@ def asked_of(of: Scene | Manifest, overrides: dict[str, float]) -> Asked:
     return Asked(method=of.run.method, integrated=of.integrated, bearings=bool(of.bearings), overrides=overrides)
 
 
-def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
+def _overrides_of(manifest: Manifest, settings: Sequence[str]) -> dict[str, float]:
     """Numbers of ``--set`` by path, of a generated folder whose scene may not be here.
 
     Raises
@@ -145,7 +145,7 @@ def read_value(option: str, text: str, unit: str) -> float:
     return value
 
 
-def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
+def _plain_overrides(manifest: Manifest, settings: Sequence[str]) -> dict[str, float] | None:
     """Numbers of ``--set`` by path, where the manifest's bounds alone show that they are right; else None."""
     # ends of windows and knots of tables are checked against each other when a scene is read
     paths = [text.partition("=")[0].strip() for text in settings]
@@ -159,7 +159,7 @@ def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float
 
 def read_with_settings(
     path: Path,
-    settings: list[str] | None,
+    settings: Sequence[str] | None,
     cycles: float | None = None,
     duration: float | None = None,
     transient: float | None = None,

@@ -6,8 +6,6 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ballpass.runtime.app.commands.shared import command, note, show
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
@@ -30,11 +28,11 @@ def _names(incomplete: str) -> list[str]:
 def new(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME",
-            help="Name of a scene: press, four-bar, engine, rotor ...",
-            show_default=False,
-            autocompletion=_names,
+        Option(
+            shown="NAME",
+            words="Name of a scene: press, four-bar, engine, rotor ...",
+            positional=True,
+            complete=_names,
         ),
     ] = None,
     folder: Annotated[

@@ -49,10 +49,11 @@ SceneFolderOrRun = Annotated[
 ]
 
 Settings = Annotated[
-    list[str] | None,
+    Sequence[str] | None,
     Option(
         shown="PATH=VALUE",
-        words='Another value for a number of the scene: `--set bearing.clearance="20 um"`. May be repeated.',
+        words="Another value for a number of the scene, may be repeated.",
+        example='bearing.clearance="20 um"',
     ),
 ]
 

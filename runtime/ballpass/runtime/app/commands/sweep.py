@@ -77,7 +77,7 @@ TWINS = 1000
 def sweep(
     scene: options.SceneOrFolder,
     vary: Annotated[
-        list[str] | None,
+        Sequence[str] | None,
         Option(
             shown="PATH=A:B:N",
             words='N values of a number of the scene from A to B: `--vary bearing.clearance="5 um:40 um:8"`. With '

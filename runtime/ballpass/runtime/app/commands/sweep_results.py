@@ -24,6 +24,7 @@ from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import ReportTable
 from ballpass.runtime.report.short_words import head_lines
+from ballpass.runtime.report.units import with_units
 from ballpass.runtime.solution.netcdf import Variable, netcdf_bytes
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class Sweep:
         """The request and its results, in SI; members in the order of the table."""
         result = self.result
         paths = [one.name for one in self.ranges]
-        return {
+        facts = {
             "scene": result.manifest.scene,
             "title": result.manifest.title,
             "members": math.prod(self.shape),
@@ -148,7 +149,11 @@ class Sweep:
             ],
             "interrupted": result.interrupted,
             "statistics": asdict(result.statistics),
+            "units": {
+                info.name: info.unit for info in result.manifest.parameters if info.name in {*paths, *self.fixed}
+            },
         }
+        return with_units(facts)
 
     def write(self, folder: Path, formats: Sequence[str]) -> list[str]:
         """Write all files, figures of these formats, and delete those of an earlier sweep.  Returns their names."""
