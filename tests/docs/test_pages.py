@@ -10,6 +10,7 @@ themselves, while the site is built.
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import shlex
@@ -221,6 +222,8 @@ def test_blocks_are_of_kinds_that_are_run_or_read() -> None:
         for kind, text in FENCE.findall((ROOT / page).read_text(encoding="utf-8")):
             if kind == "toml":
                 tomllib.loads(text)
+            elif kind == "json":
+                json.loads(text)
             elif kind not in ("console", "python") and not kind.startswith("{"):
                 assert any(text.startswith((begin, f"  {begin}")) for begin in NOT_READ), (
                     f"{page}: nobody checks\n{text}"
