@@ -33,7 +33,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 #: Arguments of each tool whose answer is JSON.
 ASKED: dict[str, dict[str, Any]] = {
     "bearings": {"pattern": "6204", "shaft": "k6"},
-    "bifurcation": {"vary": f"{LOOSE}:2", "readings": 20, "settling": 10},
+    "bifurcation": {"vary": [f"{LOOSE}:2"], "readings": 20, "settling": 10},
     "dataset": {"spec": "bearing_faults.toml"},
     "explain": {"set": ["bearing.clearance=15 um"]},
     "fit": {"data": ["measured.csv"], "vary": [LOOSE], "cycles": 4, "starts": 1},

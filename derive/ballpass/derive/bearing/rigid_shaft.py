@@ -48,10 +48,6 @@ class RigidShaft:
     polar_inertia: sp.Expr
     center_of_mass: sp.Expr
 
-    def at(self, place: sp.Expr) -> Motion:
-        """Motion of the axis at a place along it."""
-        return displaced(self.reference, self.slope, place)
-
     @property
     def tilting(self) -> tuple[Inertia, ...]:
         """Inertia of the tilts."""
@@ -66,7 +62,7 @@ class RigidShaft:
 
     def loaded(self, load: RingLoad, speed: sp.Expr) -> Coupled:
         """What a shaft adds that is loaded one-way; its own inertia is not that of a linkage's body."""
-        center = self.at(self.center_of_mass)
+        center = displaced(self.reference, self.slope, self.center_of_mass)
         own = (
             Inertia(amount=self.mass, rate=v, acceleration=a)
             for v, a in zip(center.velocity, center.acceleration, strict=True)
@@ -87,7 +83,7 @@ class RigidShaft:
                 rows.append((f"shaft.load.{axis}", force, "N", f"Sum of the forces on the shaft along {axis}"))
             power = dot(load.force, self.reference.velocity) + dot(load.moment, self.slope.velocity)
             rows.append(("shaft.load.power", power, "W", "Power of the forces on the shaft"))
-            center = self.at(self.center_of_mass).velocity
+            center = displaced(self.reference, self.slope, self.center_of_mass).velocity
             twice = self.mass * dot(center, center) + self.transverse_inertia * dot(*[self.slope.velocity] * 2)
             rows.append(("shaft.kinetic_energy", twice / 2, "J", "Kinetic energy of the shaft without its rotation"))
         return [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]

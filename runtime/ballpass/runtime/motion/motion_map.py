@@ -118,6 +118,7 @@ class MotionMap(ShortRepr, Reported):
             "vary": [one.name for one in self.vary],
             "vary_unit": [one.unit for one in self.vary],
             "values": [one.values.tolist() for one in self.vary],
+            "units": {"values": "SI", "half": "1"},
             **self._named("every"),
             **{name: getattr(self, name).tolist() for name in ("kinds", "exponent", "half")},
             "open": self._plane(self.motions.open).tolist(),
