@@ -141,8 +141,10 @@ def test_the_kit_passes_the_page_s_law(law_of: Callable[..., str]) -> None:
     [
         ("wrong_unit", "rate**3", "rate**2 * sp.Piecewise((1, rate > 0), (-1, True))", "has not the unit N"),
         ("no_event", "rate**3", "rate**3 * (1 + sp.tanh((rate - 0.01) / 1e-20)) / 2", "jumps at the rate 0.01"),
-        ("gives_energy", "rate**3", "-(rate**3)", "gives energy"),
-        ("not_zero", "rate**3", "(rate**3 + coefficient / coefficient)", "not zero at rest"),
+        pytest.param("gives_energy", "rate**3", "-(rate**3)", "gives energy", marks=pytest.mark.long),
+        pytest.param(
+            "not_zero", "rate**3", "(rate**3 + coefficient / coefficient)", "not zero at rest", marks=pytest.mark.long
+        ),
         ("wrong_slope", "rate**3", "rate**3 * (1 + sp.sin(rate * 1e14) / 2)", "its slope by the rate"),
     ],
 )

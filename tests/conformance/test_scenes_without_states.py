@@ -202,7 +202,7 @@ def _commands() -> set[str]:
 
 
 #: Commands that take no scene, or whose answer of any scene has nothing to do with states.
-NO_SCENE = {"new", "bearings", "schema", "derive", "equations", "dataset"}
+NO_SCENE = {"new", "bearings", "schema", "derive", "equations", "dataset", "mcp", "skill"}
 
 VARY = f"{SPEED}=50rad/s:80rad/s"
 ANSWERED = {

@@ -57,6 +57,7 @@ def test_a_bearing_within_all_limits_gets_no_word(make_model: Callable[..., Mode
     assert any("n d_m = 1.28e+06 mm/min exceeds 500000" in words for words in fast)
 
 
+@pytest.mark.long
 def test_a_short_burst_of_speed_is_judged_by_its_highest(make_model: Callable[..., Model]) -> None:
     """Most of the time 300 rpm, for a moment 18 000 rpm: 33.5 mm by 18 000 rpm is beyond what grease allows."""
     rows = (
