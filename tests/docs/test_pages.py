@@ -50,6 +50,7 @@ NOT_RUN = {
     r".* --scheduler tcp:": "needs them",
     r"(\.venv/bin/)?ballpass explore ": "needs ziglang; tests/runtime/test_explore.py runs it",
     r"python -m scripts\.validation\.": "tests/docs/test_validation.py runs it",
+    r"ballpass run my_press.toml --plugin ": "a package of the reader's own; tests/test_plugins.py runs it",
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
     r".* --of life --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
 }
