@@ -148,6 +148,7 @@ def test_a_generated_folder_runs_where_derive_sympy_pint_and_figures_are_missing
     assert each.returncode == 0, each.stderr
     ends = {name: (code, said) for name, code, said in map(str.split, each.stdout.splitlines())}
     assert ends.pop("dataset")[0] == "2"  # Zarr comes first
+    assert (ends.pop("skill")[0], ends.pop("mcp")[0]) == ("0", "2")  # a text; a package that may be missing
     assert ends.pop("explore")[0] == "2"  # ziglang does, where it is not installed
     for name in ("spectrum", "bifurcation", "optimize", "fit", "sobol", "morris"):
         assert ends.pop(name)[0] == "2"  # SciPy does
