@@ -19,7 +19,7 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.lowering.jacobians import Described, Group, group_functions, partials, tangent
+from ballpass.derive.lowering.jacobians import Described, Outputs, group_functions, partials, tangent
 from ballpass.derive.lowering.kernels import KernelBuilder, Kernels
 from ballpass.derive.lowering.mass_matrix import accelerations
 from ballpass.derive.lowering.visitor import Visitor
@@ -50,7 +50,7 @@ class LoweredFunctions(ShortRepr):
     functions: tuple[Described, ...]
     equations: tuple[Described, ...]
     jacobians: tuple[Described, ...]
-    groups: tuple[Group, ...]
+    groups: tuple[Outputs, ...]
     kernels: Kernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
@@ -246,7 +246,7 @@ class _Lowering:
         )
         return ca.SX(symbols), ca.SX(values)
 
-    def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Group], list[Described]]:
+    def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Outputs], list[Described]]:
         """Derivatives of the right-hand side and of every quantity, also of those that no run reports.
 
         They use the constants there are and add none.
@@ -262,7 +262,7 @@ class _Lowering:
         for name, moving in (("ring_quantities", True), ("load_quantities", False)):
             chosen = [(q, v) for q, v in values if _uses({q.name: v}, self.x) == moving]
             if chosen:
-                groups.append(Group(name=name, outputs=tuple(q for q, _ in chosen)))
+                groups.append(Outputs(name=name, outputs=tuple(q for q, _ in chosen)))
                 made += group_functions(name, [v for _, v in chosen], arguments)
         if system.bearings:
             made += group_functions("static_forces", self._static_forces(visit), arguments)

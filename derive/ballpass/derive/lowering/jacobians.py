@@ -37,7 +37,7 @@ DERIVATIVES = (*(f"_jac_{key}" for key in _WORDS), "_tangent")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Group:
+class Outputs:
     """Quantities of one generated function: their names and sizes are those of `outputs`, in this order."""
 
     name: str
