@@ -106,6 +106,7 @@ position = "{place}"
         ('position = "100 mm"', 'position = "100 mm"\nshare = 0.5', "is given twice"),
         ('position = "100 mm"', 'coupling = "two-way"', "bearings.front"),
         ('pulley = "150 mm"', 'pully = "150 mm"', 'did you mean "pulley"'),
+        ('pulley = "150 mm"', 'pulley = "150 mm", A = "5 mm"', "positions.A .* no place along the shaft of its own"),
         (
             'points = { B = "origin", C = "120 mm" }',
             'points = { B = "origin", C = "120 mm" }\npositions = { C = "1 mm" }',

@@ -33,6 +33,7 @@ from ballpass.derive.scene.errors import Fault, LinkageError, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
 from ballpass.derive.scene.records import (
+    FRAME,
     OUTPUTS,
     HarmonicLoad,
     Load,
@@ -290,6 +291,9 @@ def _read(root: Table, name: str) -> Scene:
         if mechanism is not None:
             named = [body.name for body in mechanism.bodies if known and body.positions and body.name != driven]
             _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
+            pivots = {j.point(driven or "") for j in mechanism.joints if j.bodies == (FRAME, driven)}
+            own = [name for body in mechanism.bodies if body.name == driven for name, _ in body.positions]
+            _refuse_places(root, [f"mechanism.bodies.{driven}.positions.{name}" for name in own if name in pivots])
             _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads, None if root.collector.faults else mechanism)
         speeds = mechanism.driver.table if mechanism is not None else None
@@ -518,9 +522,10 @@ def _refuse_places(root: Table, paths: Sequence[str]) -> None:
     for path in paths:
         root.fault(
             path,
-            "no bearing carries this by levers",
-            allowed="places of the driven body's points, and of loads, where both bearings have a position",
-            remedy="delete it, or give both bearings a position in place of share",
+            "this has no place along the shaft of its own: no bearing would carry it by that",
+            allowed="places of loads, and of the driven body's points but that of the driver's joint, where its "
+            "bearings have a position",
+            remedy="delete it, or give the bearings a position in place of share",
         )
 
 
