@@ -117,28 +117,28 @@ def test_curves_follow_a_slider(page: Path, browser: Page) -> None:
 @needs_browser
 @needs_compiler
 @pytest.mark.long
-def test_a_move_of_a_slider_is_painted_within_50_ms_of_the_processor(page: Path, browser: Page) -> None:
-    """From the input until the frame is painted: what the main thread of the page computes, medians of nine moves."""
+def test_a_move_of_a_slider_lays_the_page_out_a_few_times(page: Path, browser: Page) -> None:
+    """From input to frame: a page that reads sizes between writes would lay out for every curve."""
     browser.open(page)
     browser.wait(DONE)
-    browser.call("Performance.enable", timeDomain="threadTicks")
+    browser.call("Performance.enable")
 
-    def spent() -> float:
+    def layouts() -> float:
         metrics = browser.call("Performance.getMetrics")["metrics"]
-        return float(next(one["value"] for one in metrics if one["name"] == "TaskDuration"))
+        return float(next(one["value"] for one in metrics if one["name"] == "LayoutCount"))
 
-    times = []
+    counts = []
     for place in range(100, 109):
-        before = spent()
+        before = layouts()
         browser.value(
             "new Promise((done) => { const slider = document.querySelector('[data-name=\"bearing.clearance\"] input');"
             f"slider.value = {place}; slider.dispatchEvent(new Event('input'));"
             "const look = () => requestAnimationFrame(() => (busy ? look() : setTimeout(done)));"
             "look(); })"
         )
-        times.append(spent() - before)
+        counts.append(layouts() - before)
     assert browser.value("current !== scene")
-    assert 1e-3 < np.median(times) < 50e-3
+    assert 1 <= np.median(counts) <= 2
 
 
 @needs_browser
