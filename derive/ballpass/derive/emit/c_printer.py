@@ -8,6 +8,7 @@ this text.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
@@ -16,6 +17,9 @@ import casadi as ca
 
 #: Largest denominator of an exponent that is taken for a fraction; `driver/powers.h` has roots so high.
 HIGHEST_ROOT = 12
+
+#: So many zeros of a result are written in a loop: bearings that do not feel each other leave most of a Jacobian empty.
+MANY_ZEROS = 32
 
 _TEXTS = {
     ca.OP_NEG: "-{0}",
@@ -102,6 +106,11 @@ def print_function(
         for k in range(function.n_instructions())
     ]
     head += _unused(function, steps)
+    void = _zeros(function, steps)
+    for k in range(function.n_out()):
+        if any(out == k for out, _ in void.values()):
+            size = f"{function.size1_out(k) * function.size2_out(k)}{f' * {lanes}' if lanes else ''}"
+            head.append(f"    for (int i = 0; i < {size}; i++) {function.name_out(k)}[i] = 0.0;")
     body: list[str] = []
     if lanes:
         body += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
@@ -115,6 +124,8 @@ def print_function(
     shared: set[str] = set()
     for k, (operation, out, take) in enumerate(steps):
         if k in silent:
+            continue
+        if k in void:
             continue
         if operation == ca.OP_OUTPUT:
             place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
@@ -179,6 +190,20 @@ def _fractional_exponents(function: ca.Function, steps: Sequence[_Step]) -> tupl
         if operation != ca.OP_OUTPUT:
             made_by[out[0]] = k
     return found, silent - used
+
+
+def _zeros(function: ca.Function, steps: Sequence[_Step]) -> dict[int, tuple[int, int]]:
+    """Instructions that write the zeros of results with many: result and entry."""
+    zero: dict[int, bool] = {}
+    found: dict[int, tuple[int, int]] = {}
+    for k, (operation, out, take) in enumerate(steps):
+        if operation == ca.OP_OUTPUT:
+            if zero[take[0]]:
+                found[k] = (out[0], out[1])
+        else:
+            zero[out[0]] = operation == ca.OP_CONST and function.instruction_constant(k) == 0.0
+    counts = Counter(result for result, _ in found.values())
+    return {k: of for k, of in found.items() if counts[of[0]] >= MANY_ZEROS}
 
 
 def _shared_divisors(steps: Sequence[_Step]) -> dict[int, tuple[str, bool]]:

@@ -7,7 +7,8 @@ tangents.h           its derivatives along several directions at once
 switches.h           where the laws have kinks, and the laws with their sides held; none where they have no kinks
 ensemble_kernels.h   the model for a member of an ensemble in each lane
 
-Everything of bearing b is named ``bp_<b>_...`` and ``BP_<b>_...``; ``BP_EACH_BEARING(DO)`` is ``DO(0) DO(1) ...``.
+What bearings of one structure have alike is written once, named ``bp_<b>_...`` and ``BP_<b>_...`` for structure b.
+``BP_EACH_STRUCTURE(DO)`` is ``DO(0) DO(1) ...``, ``BP_EACH_BEARING(DO)`` a loop over the bearings of each.
 """
 
 from __future__ import annotations
@@ -47,8 +48,7 @@ _OF_MEMBERS = (
 def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels) -> str:
     """Text of kernels.h."""
     n = len(system.coordinates)
-    count = len(kernels.bearings)
-    lives = [RATED[bearing.element].life for bearing in system.scene.bearings]
+    bearings = kernels.bearings
     sizes = {
         "BP_NQ": n,
         "BP_NX": 2 * n,
@@ -59,9 +59,9 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         "BP_NW": kernels.stage_size,
         "BP_NA": kernels.angles,
         "BP_NJ": kernels.stage_slopes_size,
-        "BP_BEARINGS": count,
-        "BP_NB": sum(b.balls for b in kernels.bearings),
-        "BP_NS": sum(b.sums for b in kernels.bearings),
+        "BP_BEARINGS": len(bearings),
+        "BP_NB": sum(b.balls for b in bearings),
+        "BP_NS": sum(b.sums for b in bearings),
         "BP_RINGS": RINGS,
         "BP_NR": kernels.relative_size,
         "BP_NG": kernels.slopes,
@@ -78,36 +78,43 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
         + "\n"
         + _integers("bp_is_angle", [int(c.kind != "displacement") for c in system.coordinates])
         + ("\n#define BP_HAS_LAGS\n" + _integers("bp_is_lag", lags) if any(lags) else ""),
-        "#define BP_EACH_BEARING(DO) " + " ".join(f"DO({k})" for k in range(count)),
-        *(_bearing(k, kernels.bearings, lives[k]) for k in range(count)),
+        "/* Of each bearing, where its entries begin behind those of the bearings before. */\n"
+        + "\n".join(
+            _integers(f"bp_first_{name}", [*accumulate(sizes, initial=0)])
+            for name, sizes in {
+                "ball": [b.balls for b in bearings],
+                "relative": [b.relative for b in bearings],
+                "sum": [b.sums for b in bearings],
+                "slope": [b.slopes for b in bearings],
+            }.items()
+        ),
+        f"#define BP_EACH_STRUCTURE(DO) {' '.join(f'DO({k})' for k in range(len(kernels.structures)))}\n"
+        f"#define BP_EACH_BEARING(DO) {' '.join(f'BP_ALIKE({k}, DO)' for k in range(len(kernels.structures)))}",
+        *(
+            _structure(k, alike, bearings, RATED[system.scene.bearings[alike[0]].element].life)
+            for k, alike in enumerate(kernels.structures)
+        ),
         *(_single(k) for k in kernels.functions),
         *(_turned(k) for k in kernels.turned),
     ]
     return _header("KERNELS", parts)
 
 
-def _bearing(index: int, bearings: tuple[BallKernels, ...], life: ElementLife) -> str:
-    """Sizes of a bearing, its balls' directions in the cage, and its kernels, the balls in lanes."""
-    own = bearings[index]
-
-    def first(sizes: Iterable[int]) -> int:
-        """Place of the bearing's entries behind those of the bearings before."""
-        return list(accumulate(sizes, initial=0))[index]
-
+def _structure(index: int, alike: tuple[int, ...], bearings: tuple[BallKernels, ...], life: ElementLife) -> str:
+    """Sizes of a structure, its balls' directions in the cage, and its kernels, the balls in lanes."""
+    own = bearings[alike[0]]
     sizes = {
+        "ALIKE": len(alike),
         "BALLS": own.balls,
-        "FIRST_BALL": first(b.balls for b in bearings),
         "NK": own.numbers,
-        "FIRST_RELATIVE": first(b.relative for b in bearings),
         "SUMS": own.sums,
-        "FIRST_SUM": first(b.sums for b in bearings),
         "SLOPES": own.slopes,
-        "FIRST_SLOPE": first(b.slopes for b in bearings),
         "PARTIALS": own.partials,
         **_load_powers(life),
     }
     angles = [sp.Rational(2 * j, own.balls) * sp.pi for j in range(own.balls)]
-    name = f" of {own.prefix[:-1]}" if own.prefix else ""
+    names = ", ".join(bearings[k].prefix[:-1] for k in alike)
+    name = f" of {names}" if names else ""
     words = {
         "forces": f"Summands of the forces of the balls{name}",
         "slopes": f"The same, and of their slopes{name}",
@@ -116,14 +123,46 @@ def _bearing(index: int, bearings: tuple[BallKernels, ...], life: ElementLife) -
     return "\n\n".join(
         [
             _sizes({f"BP_{index}_{key}": value for key, value in sizes.items()}),
+            _integers(f"bp_{index}_bearings", [*alike]),
             print_array(f"bp_{index}_cos", [float(sp.cos(a)) for a in angles]),
             print_array(f"bp_{index}_sin", [float(sp.sin(a)) for a in angles]),
-            print_function(
-                own.over_numbers["numbers"],
-                prefix=f"bp_{index}_",
-                description=f"Numbers that the balls{name} depend on.",
-            ),
+            _numbers(index, [bearings[k].taken for k in alike], name),
             *(_of_balls(own.over_numbers[key], index, text) for key, text in words.items()),
+        ]
+    )
+
+
+def _numbers(index: int, taken: list[tuple[tuple[str, int], ...]], name: str) -> str:
+    """The numbers that balls depend on, of one state and of one in each lane."""
+    rows = ", ".join("{" + (", ".join(str(place) for _, place in of) or "0") + "}" for of in taken)
+    arguments = (
+        "const int alike, " + ", ".join(f"const double *restrict {kind}" for kind in "pcw") + ", double *restrict k"
+    )
+    used = {kind for kind, _ in taken[0]} | ({"alike"} if taken[0] else set())
+    unused = [f"    (void){argument};" for argument in ("alike", *"pcw") if argument not in used]
+    body = [f"k[{i}] = {kind}[bp_{index}_taken[alike][{i}]];" for i, (kind, _) in enumerate(taken[0])]
+    in_lanes = [
+        f"k[{i} * BP_LANES + lane] = {kind}[bp_{index}_taken[alike][{i}] * BP_LANES + lane];"
+        for i, (kind, _) in enumerate(taken[0])
+    ]
+    return "\n".join(
+        [
+            f"/* Numbers that the balls{name} depend on, and where they are. */",
+            f"static const int bp_{index}_taken[{len(taken)}][{max(len(taken[0]), 1)}] = {{{rows}}};",
+            f"static inline void bp_{index}_numbers({arguments})",
+            "{",
+            *unused,
+            *(f"    {line}" for line in body or ["k[0] = 0.0;"]),
+            "}",
+            "/* The same of a state in each lane. */",
+            f"static inline void bp_{index}_numbers_lanes({arguments})",
+            "{",
+            *unused,
+            "#pragma omp simd",
+            "    for (int lane = 0; lane < BP_LANES; lane++) {",
+            *(f"        {line}" for line in in_lanes or ["k[lane] = 0.0;"]),
+            "    }",
+            "}",
         ]
     )
 
@@ -180,20 +219,13 @@ def tangents_header(kernels: Kernels) -> str:
     """Text of tangents.h."""
 
     parts = ['#include "kernels.h"', _turned(kernels.stage_slopes)]
-    for index, bearing in enumerate(kernels.bearings):
-        numbers = bearing.over_numbers["numbers"]
+    for index, (first, *_) in enumerate(kernels.structures):
+        own = kernels.bearings[first].over_numbers
         words = "Derivatives by the ball's angle, by r0 and by k, behind those of `slopes`"
         parts += [
-            _of_balls(bearing.over_numbers["partials"], index, words),
-            print_function(
-                numbers,
-                prefix=f"bp_{index}_",
-                description="The numbers out of BP_LANES directions of p, c and w.",
-                lanes="BP_LANES",
-                varying=frozenset(numbers.name_in()),
-            ),
-            _moved(bearing.over_numbers["moved"], f"bp_{index}_", "Derivative of the slopes' summands of a ball"),
-            _moved(bearing.over_numbers["sums_moved"], f"bp_{index}_", "Derivative of the sums over the balls"),
+            _of_balls(own["partials"], index, words),
+            _moved(own["moved"], f"bp_{index}_", "Derivative of the slopes' summands of a ball"),
+            _moved(own["sums_moved"], f"bp_{index}_", "Derivative of the sums over the balls"),
         ]
     parts += [_moved(kernel.function, "bp_", kernel.description) for kernel in kernels.tangents]
     return _header("TANGENTS", parts)
@@ -214,16 +246,19 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
     """
     flags: dict[str, list[float]] = {"ends_above": [], "ends_below": [], "of_rate": [], "has_rate": []}
     parts, sizes = [], {}
-    for index, (model, own) in enumerate(zip(system.bearings, kernels.bearings, strict=True)):
-        sizes[f"BP_{index}_FIRST_EVENT"] = len(flags["of_rate"])
+    firsts = []
+    for model, own in zip(system.bearings, kernels.bearings, strict=True):
+        firsts.append(len(flags["of_rate"]))
         switches = model.ball.switching.switches
-        sizes[f"BP_{index}_SWITCHES"] = len(switches)
         damped = model.ball.damping_force is not None
         for switch in switches:
             flags["ends_above"] += [float(switch.ends_above)] * own.balls
             flags["ends_below"] += [float(switch.ends_below)] * own.balls
             flags["of_rate"] += [float(switch.of_rate)] * own.balls
             flags["has_rate"] += [float(damped and not switch.of_rate)] * own.balls
+    for index, (first, *_) in enumerate(kernels.structures):
+        own, switches = kernels.bearings[first], system.bearings[first].ball.switching.switches
+        sizes[f"BP_{index}_SWITCHES"] = len(switches)
         words = {
             "switches": "Switching functions [m, or m/s], and the rates of those of deflections",
             "held_forces": "Summands of the forces, sides held",
@@ -235,11 +270,11 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
             parts.append(_moved(own.over_numbers["switches_moved"], f"bp_{index}_", "Switching functions of a ball"))
         else:
             parts.append(_WITHOUT_SWITCHES.format(b=index))
-    first = len(flags["of_rate"])
+    behind = len(flags["of_rate"])
     places = [system.inputs.index(switch.border) for switch in system.switches]
     if kernels.windows:
         borders = [k for k in places if system.inputs[k].windows]
-        sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": first}
+        sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": behind}
         _flag_borders(flags, len(borders))
         of_driver = [int(s.angle == DRIVER_ANGLE) for s in system.switches if s.angle is not None]
         parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders)]
@@ -254,6 +289,7 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
     tables = "\n".join(print_array(f"bp_{name}", values) for name, values in flags.items())
     head = [
         '#include "kernels.h"',
+        _integers("bp_first_event", firsts),
         _sizes({"BP_EVENTS": len(flags["of_rate"]), **sizes}),
         "/* Where the force above a kink, or below it, ends at a branch point; where it is one of the rate; where\n"
         "   a rate comes with the switching function. */\n" + tables,
@@ -286,16 +322,17 @@ def ensemble_header(kernels: Kernels) -> str:
 
     parts = ['#include "kernels.h"']
     parts += [member(kernels[name].function, "bp_member_", kernels[name].description) for name in _OF_MEMBERS]
-    for index, bearing in enumerate(kernels.bearings):
+    for index, (first, *_) in enumerate(kernels.structures):
+        bearing = kernels.bearings[first]
         pair = "a ball and the one opposite" if bearing.paired else "a ball"
         directions = bearing.balls // 2 if bearing.paired else bearing.balls
-        parts.append(f"enum {{ BP_{index}_DIRECTIONS = {directions} }};")
-        words = {
-            "forces": f"Summands of the forces of {pair}",
-            "slopes": "The same, and of their slopes",
-            "contact": f"{', '.join(CONTACT).replace('_', ' ')} of a ball",
-        }
-        parts += [member(bearing.over_model[key], f"bp_member_{index}_", text) for key, text in words.items()]
+        own = bearing.over_numbers
+        parts += [
+            f"enum {{ BP_{index}_DIRECTIONS = {directions} }};",
+            member(own["member_forces"], f"bp_{index}_", f"Summands of the forces of {pair}"),
+            member(own["member_slopes"], f"bp_{index}_", "The same, and of their slopes"),
+            member(own["contact"], f"bp_{index}_member_", f"{', '.join(CONTACT).replace('_', ' ')} of a ball"),
+        ]
     return _header("ENSEMBLE_KERNELS", parts)
 
 

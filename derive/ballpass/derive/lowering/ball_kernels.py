@@ -7,12 +7,11 @@ In: the generic ball, and visitors of a lowering.  Out: `BallKernels`, small SX 
              r5, r6: cosine and sine of the cage's angle; where rings do not turn evenly, behind these what e needs of
              the state, as the speed of the rings and the cosine and sine of the inner one's angle.  Where deflection
              or rate is no such sum, r0 to r4 are zero, and all that these need of the state is behind r6
-    k        numbers of the ball: entries of p, c and w, gathered once by ``numbers``
+    k        numbers of the ball: entries of p, c and w, which the C driver gathers once
 
 Each gives *rows*, summands over the balls; the C driver loops over balls (lanes), adds the rows up, and knows counts
 only:
 
-numbers   (p, c, w) -> k
 forces    -> S            F co, F si; F e' where effects turn bodies (own_terms)
 slopes    -> S, G         and the slopes of S: Fd cc, Fd cs, Fd ss, Fv cc, Fv cs, Fv ss; with effects the rows that
                           time alone moves; or, where rings do not turn evenly or deflections are no such sum, all
@@ -23,6 +22,7 @@ sums_moved  (sums of the rows of partials, along directions of r, angle, k) -> d
 contact   -> force, elastic force, damping force, deflection
 switches  -> g, dg/dt     switching functions of the law; the rate where there is one
 held_forces, held_slopes  (..., b): the law with its sides held by borders b (see bearing/switching.py)
+member_forces, member_slopes  the first two for ensembles: of opposite balls together where `paired`
 """
 
 from __future__ import annotations
@@ -49,10 +49,9 @@ class BallKernels:
     ----------
     prefix : of the bearing's names
     balls : their number
-    over_numbers : functions over (co, si, r, k), by name; ``numbers`` is (p, c, w) -> k
-    over_model : `forces`, `slopes` and `contact` over (co, si, r, p, c, w), for ensembles, where every member has
-        numbers of its own; of opposite balls together where `paired`
-    paired : whether the rows of `over_model`'s sums are those of a ball and of the one opposite
+    over_numbers : functions over (co, si, r, k), by name
+    taken : entries of k: ``p``, ``c`` or ``w``, and the place there
+    paired : whether the sums of members take a ball and the one opposite together
     sums, slopes, partials : rows of S, and behind them
     relative : entries of r
     """
@@ -60,7 +59,7 @@ class BallKernels:
     prefix: str
     balls: int
     over_numbers: dict[str, ca.Function]
-    over_model: dict[str, ca.Function]
+    taken: tuple[tuple[str, int], ...]
     paired: bool
     sums: int
     slopes: int
@@ -69,8 +68,14 @@ class BallKernels:
 
     @property
     def numbers(self) -> int:
-        """Entries of k."""
-        return int(self.over_numbers["numbers"].size1_out(0))
+        """Entries of k; C has no arrays of length zero."""
+        return max(len(self.taken), 1)
+
+    @property
+    def structure(self) -> tuple[object, ...]:
+        """What bearings have in common whose kernels are written once."""
+        kinds = tuple(kind for kind, _ in self.taken)
+        return (self.balls, self.relative, kinds, *(f"{n} {f.serialize()}" for n, f in self.over_numbers.items()))
 
 
 class BallBuilder:
@@ -269,12 +274,20 @@ class BallBuilder:
             rows = ca.cse([ca.densify(ca.vertcat(*rows))])
             return ca.Function(name, [*inputs.values()], rows, [*inputs], ["rows"])
 
-        contact = [at["F"], at["elastic"], at["damping"], at["delta"]]
-        over_model = {"forces": made("forces", sums), "slopes": made("slopes", [*sums, *slopes])}
         own = {
-            **over_model,
-            "contact": made("contact", contact),
+            "forces": made("forces", sums),
+            "slopes": made("slopes", [*sums, *slopes]),
+            "contact": made("contact", [at["F"], at["elastic"], at["damping"], at["delta"]]),
         }
+        both, joint = sums, slopes
+        if self._opposite is not None:
+            # each ball's rows and then their sum, as single runs add them up: the same bits
+            to = self._opposite
+            both = [one + other for one, other in zip(sums, self._sums(to, "F"), strict=True)]
+            behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
+            joint = [one + other for one, other in zip(slopes, behind, strict=True)]
+        own["member_forces"] = made("member_forces", both)
+        own["member_slopes"] = made("member_slopes", [*both, *joint])
         border = {"b": at["b"]}
         if at["b"].numel():
             held = self._sums(at, "held")
@@ -282,8 +295,8 @@ class BallBuilder:
             own["held_forces"] = made("held_forces", held, border)
             behind = self._slopes(at, co, si, at["held_d"], at["held_v"])
             own["held_slopes"] = made("held_slopes", [*held, *behind], border)
-        over_numbers = _over_numbers(own, len(takes))
-        numbers = over_numbers["numbers"].size1_out(0)
+        over_numbers, taken = _over_numbers(own, len(takes))
+        numbers = max(len(taken), 1)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
         over_numbers["moved"] = _along("moved", over_numbers["slopes"], slice(len(sums), None), "G_d")
         if at["b"].numel():
@@ -295,18 +308,11 @@ class BallBuilder:
             )
         partials = over_numbers["partials"].size1_out(0)
         over_numbers["sums_moved"] = self._sums_moved(partials, numbers, len(sums), len(slopes))
-        if self._opposite is not None:
-            # each ball's rows and then their sum, as single runs add them up: the same bits
-            to = self._opposite
-            both = [one + other for one, other in zip(sums, self._sums(to, "F"), strict=True)]
-            behind = self._slopes(to, -co, -si, to["Fd"], to["Fv"])
-            joint = [one + other for one, other in zip(slopes, behind, strict=True)]
-            over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}
         return BallKernels(
             prefix=self.bearing.names.prefix,
             balls=self.bearing.ball.count,
             over_numbers=over_numbers,
-            over_model={**over_model, "contact": own["contact"]},
+            taken=taken,
             paired=self._opposite is not None,
             sums=len(sums),
             slopes=len(slopes),
@@ -353,8 +359,10 @@ def _along(name: str, of: ca.Function, rows: slice, result: str) -> ca.Function:
     return ca.Function(name, [*given.values(), *along.values()], ca.cse([moved]), [*given, *along], [result])
 
 
-def _over_numbers(functions: dict[str, ca.Function], kept: int) -> dict[str, ca.Function]:
-    """The functions over k, the entries of p, c and w that any of them uses, and ``numbers``, (p, c, w) -> k.
+def _over_numbers(
+    functions: dict[str, ca.Function], kept: int
+) -> tuple[dict[str, ca.Function], tuple[tuple[str, int], ...]]:
+    """The functions over k, the entries of p, c and w that any of them uses; and these entries.
 
     A compiler makes lanes of a loop over balls only where a selection needs no load: the numbers are gathered first.
 
@@ -372,14 +380,11 @@ def _over_numbers(functions: dict[str, ca.Function], kept: int) -> dict[str, ca.
     order = sorted(used, key=lambda pair: ("pcw".index(pair[0]), pair[1]))
     first = next(iter(functions.values()))
     whole = {n: ca.SX.sym(n, first.size1_in(n)) for n in "pcw"}
-    # C has no arrays of length zero
-    chosen = ca.vertcat(*(whole[n][e] for n, e in order)) if order else ca.SX(0.0)
-    numbers = ca.Function("numbers", [*whole.values()], [ca.densify(chosen)], [*whole], ["k"])
     entries = ca.SX.sym("k", max(len(order), 1))
     replaced = {n: ca.SX.zeros(v.numel()) for n, v in whole.items()}
     for place, (n, e) in enumerate(order):
         replaced[n][e] = entries[place]
-    made = {"numbers": numbers}
+    made = {}
     for name, function in functions.items():
         names = [n for n in function.name_in() if n not in "pcw"]
         given = {n: ca.SX.sym(n, function.size1_in(n)) for n in names}
@@ -387,4 +392,4 @@ def _over_numbers(functions: dict[str, ca.Function], kept: int) -> dict[str, ca.
         takes = {**{n: given[n] for n in names[:kept]}, "k": entries, **{n: given[n] for n in names[kept:]}}
         results = ca.cse([ca.densify(row) for row in rows])
         made[name] = ca.Function(name, [*takes.values()], results, [*takes], function.name_out())
-    return made
+    return made, tuple(order)

@@ -60,6 +60,7 @@ class Kernels:
     tangents : directional derivatives of the functions, for sensitivities
     stage_slopes : what these share for the stages, of `stage_slopes_size` entries
     bearings : kernels of the balls
+    structures : numbers of the bearings whose kernels are the same, and of those that share them with no other
     windows : (t, x, u, p, c) -> g, rate of the windows of angles that are functions of the state, -> these angles and
         edges, and -> J, derivatives of the angles by the states (row-major); none without
     stops : (t, x, u, p, c) -> g, rate of the stops, and -> J, derivatives of g by the states (row-major); none without
@@ -75,6 +76,7 @@ class Kernels:
     tangents: tuple[Kernel, ...]
     stage_slopes: Kernel
     bearings: tuple[BallKernels, ...]
+    structures: tuple[tuple[int, ...], ...]
     windows: tuple[Kernel, ...] = ()
     stops: tuple[Kernel, ...] = ()
 
@@ -275,9 +277,16 @@ class KernelBuilder:
             ),
             stage_slopes=stage_slopes,
             bearings=bearings,
+            structures=self._structures(bearings),
             windows=windows,
             stops=self._of_stops(c) if self._stops else (),
         )
+
+    def _structures(self, bearings: Sequence[BallKernels]) -> tuple[tuple[int, ...], ...]:
+        found: dict[tuple[object, ...], list[int]] = {}
+        for k, (scene, kernels) in enumerate(zip(self._system.scene.bearings, bearings, strict=True)):
+            found.setdefault((scene.element, *kernels.structure), []).append(k)
+        return tuple(map(tuple, found.values()))
 
     def _of_windows(self, c: ca.SX) -> tuple[Kernel, Kernel, Kernel]:
         takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
@@ -318,8 +327,7 @@ def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKerne
     deflecting = sum(bearing.relative for bearing in bearings)
     needed = {column for row, column in zip(rows, columns, strict=True) if row < deflecting}
     for bearing in bearings:
-        numbers = bearing.over_numbers["numbers"]
-        needed |= {*numbers.jac_sparsity(0, numbers.name_in().index("w")).get_col()}
+        needed |= {place for kind, place in bearing.taken if kind == "w"}
     kept = ca.vertcat(*(w[k] if k in needed else ca.SX(0.0) for k in range(w.numel())))
     function = ca.Function("cage", arguments, [ca.densify(kept)], stage.name_in(), ["w"])
     return Kernel(function=function, description="Stage of deflections")

@@ -50,9 +50,9 @@ static void put_powers(bp_lane_block *b, int lane, const double *balls)
 {
 #define BP_PUT(b_)                                                                                       \
     for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                          \
-        const double force = balls[BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL + j];                         \
+        const double force = balls[BP_BALL_CHANNELS * bp_first_ball[bearing] + j];                         \
         const double load = force > 0.0 ? 1e-3 * force : 0.0;                                            \
-        b->first[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] = bp_power(load, BP_SECTOR_POWER(b_));     \
+        b->first[0][(bp_first_ball[bearing] + j) * BP_L + lane] = bp_power(load, BP_SECTOR_POWER(b_));     \
     }
     BP_EACH_BEARING(BP_PUT)
 #undef BP_PUT

@@ -64,9 +64,9 @@ static inline void bp_switch_values(const bp_numbers *n, double t, const double 
     {                                                                                                                 \
         enum { here = BP_##b##_SWITCHES * BP_##b##_BALLS };                                                           \
         BP_BALLS(b, 2 * BP_##b##_SWITCHES + 1) /* one more: a bearing may have none */                                 \
-        bp_##b##_switches_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);                                                        \
-        memcpy(g + BP_##b##_FIRST_EVENT, rows, here * sizeof *rows);                                                  \
-        memcpy(slope + BP_##b##_FIRST_EVENT, rows + here, here * sizeof *rows);                                       \
+        bp_##b##_switches_lanes(co, si, r + bp_first_relative[bearing], k, rows);                                                        \
+        memcpy(g + bp_first_event[bearing], rows, here * sizeof *rows);                                                  \
+        memcpy(slope + bp_first_event[bearing], rows + here, here * sizeof *rows);                                       \
     }
     BP_EACH_BEARING(BP_SWITCH)
 #undef BP_SWITCH

@@ -92,23 +92,29 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
     }
 }
 
-/* A kernel of bearing b for all its directions (of opposite balls one), its first rows added up to S and the others to G, in the order of
+/* Numbers of the balls of a bearing. */
+#define BP_LANE_NUMBERS(b)                                \
+    double numbers[BP_##b##_NK * BP_L] BP_ALIGNED;        \
+    bp_##b##_numbers_lanes(alike, n->p, n->c, w, numbers);
+
+/* A kernel of a bearing of structure b for all its directions (of opposite balls one), its first rows added up to S and the others to G, in the order of
    bp_total. */
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
     {                                                                                                                            \
+        BP_LANE_NUMBERS(b)                                                                                                       \
         double sum[BP_SUMMANDS][(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                                                               \
         for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                          \
             double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, more[(BP_##b##_SUMS + (slopes)) * BP_L] BP_ALIGNED;                             \
             double *rows = j < BP_SUMMANDS ? sum[j] : more;                                                                      \
-            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                  \
-            bp_member_##b##_##kernel##_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                         \
+            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE * BP_L, co, si);                                  \
+            bp_##b##_member_##kernel##_lanes(co, si, r + bp_first_relative[bearing] * BP_L, numbers, rows);                         \
             for (int m = 0; m < BP_##b##_SUMS + (slopes) && j >= BP_SUMMANDS; m++)                                                           \
                 BP_EACH_LANE sum[j % BP_SUMMANDS][m * BP_L + lane] += more[m * BP_L + lane];                                     \
         }                                                                                                                        \
         for (int j = BP_##b##_DIRECTIONS; j < BP_SUMMANDS; j++)                                                                  \
             for (int i = 0; i < (BP_##b##_SUMS + (slopes)) * BP_L; i++) sum[j][i] = 0.0;                                                     \
         for (int m = 0; m < BP_##b##_SUMS + (slopes); m++) {                                                                                 \
-            double *restrict to = m < BP_##b##_SUMS ? S + (BP_##b##_FIRST_SUM + m) * BP_L : G + (BP_##b##_FIRST_SLOPE + m - BP_##b##_SUMS) * BP_L;                  \
+            double *restrict to = m < BP_##b##_SUMS ? S + (bp_first_sum[bearing] + m) * BP_L : G + (bp_first_slope[bearing] + m - BP_##b##_SUMS) * BP_L;                  \
             BP_EACH_LANE to[lane] = (sum[0][m * BP_L + lane] + sum[2][m * BP_L + lane])                                          \
                                     + (sum[1][m * BP_L + lane] + sum[3][m * BP_L + lane]);                                       \
         }                                                                                                                        \
@@ -164,11 +170,12 @@ static inline __attribute__((flatten)) void bp_lane_deflections(const bp_lane_nu
     bp_member_cage_lanes(time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
 #define BP_CHANNEL(b)                                                                                                            \
+    BP_LANE_NUMBERS(b)                                                                                                           \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED;                               \
-        double *most = value + (BP_BALL_CHANNELS * (b) + BP_DEFLECTION) * BP_L;                                                  \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                      \
-        bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                          \
+        double *most = value + (BP_BALL_CHANNELS * bearing + BP_DEFLECTION) * BP_L;                                                  \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE * BP_L, co, si);                                      \
+        bp_##b##_member_contact_lanes(co, si, r + bp_first_relative[bearing] * BP_L, numbers, rows);                          \
         BP_EACH_LANE {                                                                                                           \
             const double own = rows[BP_DEFLECTION * BP_L + lane];                                                                \
             most[lane] = j == 0 || own > most[lane] ? own : most[lane];                                                          \
@@ -189,13 +196,14 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const double 
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
 #define BP_CHANNEL(b)                                                                                                            \
     {                                                                                                                            \
-        double *sides = side + BP_BALL_CHANNELS * (b) * BP_L;                                                                    \
-        double *to = value + BP_BALL_CHANNELS * (b) * BP_L;                                                                      \
+        BP_LANE_NUMBERS(b)                                                                                                       \
+        double *sides = side + BP_BALL_CHANNELS * bearing * BP_L;                                                                    \
+        double *to = value + BP_BALL_CHANNELS * bearing * BP_L;                                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
             double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[BP_BALL_CHANNELS * BP_L] BP_ALIGNED, load[BP_L] BP_ALIGNED;    \
-            double *own = first + (BP_##b##_FIRST_BALL + j) * BP_L;                                                              \
-            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE(b) * BP_L, co, si);                                  \
-            bp_member_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE * BP_L, n->p, n->c, w, rows);                            \
+            double *own = first + (bp_first_ball[bearing] + j) * BP_L;                                                              \
+            bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + BP_CAGE * BP_L, co, si);                                  \
+            bp_##b##_member_contact_lanes(co, si, r + bp_first_relative[bearing] * BP_L, numbers, rows);                            \
             for (int k = 0; k < BP_BALL_CHANNELS && sided; k++)                                                                  \
                 BP_EACH_LANE {                                                                                                   \
                     const int i = k * BP_L + lane, contact = k != BP_DEFLECTION && rows[BP_DEFLECTION * BP_L + lane] > 0.0;      \

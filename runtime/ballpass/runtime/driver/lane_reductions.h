@@ -97,11 +97,11 @@ static void add_passes(const bp_job *job, bp_lane_block *b, double part, double 
         for (int k = 0; k < BP_BEARINGS; k++) b->moment[0][(BP_LOOKED_AT + k) * BP_L + lane] += bp_turned(from + 2 * k, to + 2 * k);
 #define BP_ADD(b_)                                                                                                                      \
         for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
-            const double total = sum[BP_##b_##_FIRST_BALL + j][lane];                                                                   \
+            const double total = sum[bp_first_ball[bearing] + j][lane];                                                                   \
             if (total > 0.0)                                                                                                            \
-                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS,                                             \
-                              bp_turned(from + 2 * (b_), to + 2 * (b_)) * total, moment[BP_##b_##_FIRST_BALL + j][lane] / total,        \
-                              from + 2 * (b_), to + 2 * (b_));                                                                          \
+                bp_add_places(sectors + 2 * BP_SECTORS * bearing, (double)j / BP_##b_##_BALLS,                                             \
+                              bp_turned(from + 2 * bearing, to + 2 * bearing) * total, moment[bp_first_ball[bearing] + j][lane] / total,        \
+                              from + 2 * bearing, to + 2 * bearing);                                                                          \
         }
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD

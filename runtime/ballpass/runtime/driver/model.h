@@ -120,8 +120,15 @@ static inline __attribute__((always_inline)) double bp_total(const double *restr
     return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
 
+/* For each bearing what DO says of its structure b; `bearing` is its number among all, `alike` that among those of its structure. */
+#define BP_ALIKE(b, DO)                                     \
+    for (int alike = 0; alike < BP_##b##_ALIKE; alike++) { \
+        const int bearing = bp_##b##_bearings[alike];       \
+        DO(b)                                               \
+    }
+
 /* Place of the cosine of a cage's angle in the relative motion r; its sine follows. */
-#define BP_CAGE(b) (BP_##b##_FIRST_RELATIVE + BP_RINGS)
+#define BP_CAGE (bp_first_relative[bearing] + BP_RINGS)
 
 /* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine are given.  One ball a lane. */
 static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict cage, const double *restrict cage_cos,
@@ -139,8 +146,8 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
 /* Directions co, si and numbers k of the balls of bearing b, from the relative motion r and the stage variables w; room for `count` rows of summands. */
 #define BP_BALLS(b, count)                                                                                                    \
     double co[BP_##b##_BALLS], si[BP_##b##_BALLS], k[BP_##b##_NK], rows[(count) * BP_##b##_BALLS];                            \
-    bp_ball_directions(r + BP_CAGE(b), bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
-    bp_##b##_numbers(n->p, n->c, w, k);
+    bp_ball_directions(r + BP_CAGE, bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
+    bp_##b##_numbers(alike, n->p, n->c, w, k);
 
 /* Rows from the `first` on, added up. */
 #define BP_TOTALS(b, first, count, to) \
@@ -148,17 +155,17 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
 
 /* The law of the balls, and with its slopes; where kinks are located its sides are held. */
 #ifdef BALLPASS_LOCATED
-#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
-#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + bp_first_relative[bearing], k, n->border + bp_first_event[bearing], rows);
+#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + bp_first_relative[bearing], k, n->border + bp_first_event[bearing], rows);
 #else
-#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
-#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
+#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + bp_first_relative[bearing], k, rows);
+#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + bp_first_relative[bearing], k, rows);
 #endif
 
 /* Sums S over the balls of each bearing: F cos, F sin, and a torque where effects turn bodies. */
 static inline __attribute__((always_inline)) void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {
-#define BP_SUM(b) { BP_BALLS(b, BP_##b##_SUMS) BP_FORCES(b) BP_TOTALS(b, 0, BP_##b##_SUMS, S + BP_##b##_FIRST_SUM) }
+#define BP_SUM(b) { BP_BALLS(b, BP_##b##_SUMS) BP_FORCES(b) BP_TOTALS(b, 0, BP_##b##_SUMS, S + bp_first_sum[bearing]) }
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM
 }
@@ -171,8 +178,8 @@ static inline void bp_sums_and_slopes(const bp_numbers *n, const double *restric
     {                                          \
         BP_BALLS(b, BP_##b##_SUMS + BP_##b##_SLOPES) \
         BP_SLOPES(b)                           \
-        BP_TOTALS(b, 0, BP_##b##_SUMS, S + BP_##b##_FIRST_SUM) \
-        BP_TOTALS(b, BP_##b##_SUMS, BP_##b##_SLOPES, G + BP_##b##_FIRST_SLOPE) \
+        BP_TOTALS(b, 0, BP_##b##_SUMS, S + bp_first_sum[bearing]) \
+        BP_TOTALS(b, BP_##b##_SUMS, BP_##b##_SLOPES, G + bp_first_slope[bearing]) \
     }
     BP_EACH_BEARING(BP_SUM)
 #undef BP_SUM

@@ -78,8 +78,8 @@ static inline void bp_ball_quantities(const bp_numbers *n, double t, const doubl
 #define BP_CONTACT(b)                                                                                  \
     {                                                                                                  \
         BP_BALLS(b, BP_BALL_CHANNELS)                                                                  \
-        bp_##b##_contact_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);                                          \
-        memcpy(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, rows, sizeof rows);                         \
+        bp_##b##_contact_lanes(co, si, r + bp_first_relative[bearing], k, rows);                                          \
+        memcpy(q + BP_BALL_CHANNELS * bp_first_ball[bearing], rows, sizeof rows);                         \
     }
     BP_EACH_BEARING(BP_CONTACT)
 #undef BP_CONTACT
@@ -88,14 +88,9 @@ static inline void bp_ball_quantities(const bp_numbers *n, double t, const doubl
 /* Row of a channel of the balls, counted behind the states, among these quantities, and its balls. */
 static inline const double *bp_ball_row(const double *q, int channel, int *balls)
 {
-    static const int first[] = {
-#define BP_FIRST(b) BP_##b##_FIRST_BALL,
-        BP_EACH_BEARING(BP_FIRST)
-#undef BP_FIRST
-            BP_NB};
     const int bearing = channel / BP_BALL_CHANNELS;
-    *balls = first[bearing + 1] - first[bearing];
-    return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
+    *balls = bp_first_ball[bearing + 1] - bp_first_ball[bearing];
+    return q + BP_BALL_CHANNELS * bp_first_ball[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where they are not wanted. */
@@ -108,11 +103,11 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
     bp_ball_quantities(n, t, x, q);
 #define BP_MOST(b)                                                                                     \
     for (int k = 0; k < BP_BALL_CHANNELS; k++) {                                                       \
-        const double *of = q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL + k * BP_##b##_BALLS;            \
+        const double *of = q + BP_BALL_CHANNELS * bp_first_ball[bearing] + k * BP_##b##_BALLS;            \
         double most = -INFINITY;                                                                       \
         _Pragma("omp simd reduction(max : most)")                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
-        value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
+        value[BP_NX + BP_BALL_CHANNELS * bearing + k] = most;                                              \
     }
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
@@ -698,8 +693,8 @@ static inline void bp_reduce(double *reduction, int passes, const double v[BP_PO
         }
         for (int k = 0; k < BP_BEARINGS; k++) reduction[BP_MOMENT + BP_LOOKED_AT + k] += bp_turned(from + 2 * k, to + 2 * k);
 #define BP_ADD(b)                                                                                                                       \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, BP_SECTOR_POWER(b),                                   \
-                   bp_turned(from + 2 * (b), to + 2 * (b)), of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, from + 2 * (b), to + 2 * (b));
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * bearing, BP_##b##_BALLS, BP_SECTOR_POWER(b),                                   \
+                   bp_turned(from + 2 * bearing, to + 2 * bearing), of + BP_BALL_CHANNELS * bp_first_ball[bearing], from + 2 * bearing, to + 2 * bearing);
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
     }

@@ -291,19 +291,19 @@ static inline void bp_switch_moved(const ballpass_tangents *tangents, bp_tangent
     bp_relative(x, n->u, n->p, n->c, points.w[0], r);
     bp_relative_tangent_lanes(x, n->u, n->p, n->c, points.w[0], xd, at.d.u, at.d.p, at.d.c, wd, rd);
 #define BP_MOVED(b)                                                                                                              \
-    if (event >= BP_##b##_FIRST_EVENT && event < BP_##b##_FIRST_EVENT + BP_##b##_SWITCHES * BP_##b##_BALLS) {                    \
-        const int j = (event - BP_##b##_FIRST_EVENT) % BP_##b##_BALLS, which = (event - BP_##b##_FIRST_EVENT) / BP_##b##_BALLS;  \
-        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES, *turn = r + BP_CAGE(b); \
+    if (event >= bp_first_event[bearing] && event < bp_first_event[bearing] + BP_##b##_SWITCHES * BP_##b##_BALLS) {                    \
+        const int j = (event - bp_first_event[bearing]) % BP_##b##_BALLS, which = (event - bp_first_event[bearing]) / BP_##b##_BALLS;  \
+        const double *const cd = rd + BP_CAGE * BP_LANES, *const sd = cd + BP_LANES, *turn = r + BP_CAGE; \
         const double co = bp_##b##_cos[j] * turn[0] - bp_##b##_sin[j] * turn[1], si = bp_##b##_sin[j] * turn[0] + bp_##b##_cos[j] * turn[1]; \
         double k[BP_##b##_NK], kd[BP_##b##_NK * BP_LANES], cod[BP_LANES], sid[BP_LANES];                                         \
         double moved[(BP_##b##_SWITCHES + 1) * BP_LANES];                                                                        \
-        bp_##b##_numbers(n->p, n->c, points.w[0], k);                                                                            \
-        bp_##b##_numbers_lanes(at.d.p, at.d.c, wd, kd);                                                                          \
+        bp_##b##_numbers(alike, n->p, n->c, points.w[0], k);                                                                            \
+        bp_##b##_numbers_lanes(alike, at.d.p, at.d.c, wd, kd);                                                                          \
         for (int l = 0; l < BP_LANES; l++) {                                                                                     \
             cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                          \
             sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                          \
         }                                                                                                                        \
-        bp_##b##_switches_moved_lanes(&co, &si, r + BP_##b##_FIRST_RELATIVE, k, cod, sid, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, kd, moved); \
+        bp_##b##_switches_moved_lanes(&co, &si, r + bp_first_relative[bearing], k, cod, sid, rd + bp_first_relative[bearing] * BP_LANES, kd, moved); \
         memcpy(gd, moved + which * BP_LANES, BP_LANES * sizeof *gd);                                                             \
     }
     BP_EACH_BEARING(BP_MOVED)

@@ -15,9 +15,9 @@ typedef double bp_vector __attribute__((vector_size(BP_LANES * sizeof(double)), 
 typedef struct {
     const double *x, *w;
     double r[BP_NR], S[BP_NS], G[BP_NG], co[BP_NB], si[BP_NB];
-#define BP_OF_BEARING(b) double k_##b[BP_##b##_NK], total_##b[BP_##b##_SUMS + BP_##b##_PARTIALS];
-    BP_EACH_BEARING(BP_OF_BEARING)
-#undef BP_OF_BEARING
+#define BP_OF_ALIKE(b) double k_##b[BP_##b##_ALIKE][BP_##b##_NK], total_##b[BP_##b##_ALIKE][BP_##b##_SUMS + BP_##b##_PARTIALS];
+    BP_EACH_STRUCTURE(BP_OF_ALIKE)
+#undef BP_OF_ALIKE
 } bp_point;
 
 /* Directions of one block: parameters, constants, inputs of the segment. */
@@ -27,9 +27,9 @@ typedef struct {
 
 /* Sums over the balls with their slopes and partial derivatives; where kinks are located the law's sides are held. */
 #ifdef BALLPASS_LOCATED
-#define BP_PARTIALS(b) bp_##b##_held_partials_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_PARTIALS(b) bp_##b##_held_partials_lanes(co, si, r + bp_first_relative[bearing], k, n->border + bp_first_event[bearing], rows);
 #else
-#define BP_PARTIALS(b) bp_##b##_partials_lanes(co, si, r + BP_##b##_FIRST_RELATIVE, k, rows);
+#define BP_PARTIALS(b) bp_##b##_partials_lanes(co, si, r + bp_first_relative[bearing], k, rows);
 #endif
 
 static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const double *restrict w, const double *restrict x)
@@ -42,12 +42,12 @@ static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const
         const double *const r = at->r;                                                                                           \
         BP_BALLS(b, BP_##b##_SUMS + BP_##b##_PARTIALS)                                                                                       \
         BP_PARTIALS(b)                                                                                                           \
-        BP_TOTALS(b, 0, BP_##b##_SUMS + BP_##b##_PARTIALS, at->total_##b)                                                                    \
-        memcpy(at->S + BP_##b##_FIRST_SUM, at->total_##b, BP_##b##_SUMS * sizeof *at->S);                                                               \
-        memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + BP_##b##_SUMS, BP_##b##_SLOPES * sizeof *at->G);                                \
-        memcpy(at->co + BP_##b##_FIRST_BALL, co, sizeof co);                                                                     \
-        memcpy(at->si + BP_##b##_FIRST_BALL, si, sizeof si);                                                                     \
-        memcpy(at->k_##b, k, sizeof k);                                                                                          \
+        BP_TOTALS(b, 0, BP_##b##_SUMS + BP_##b##_PARTIALS, at->total_##b[alike])                                                                    \
+        memcpy(at->S + bp_first_sum[bearing], at->total_##b[alike], BP_##b##_SUMS * sizeof *at->S);                                                               \
+        memcpy(at->G + bp_first_slope[bearing], at->total_##b[alike] + BP_##b##_SUMS, BP_##b##_SLOPES * sizeof *at->G);                                \
+        memcpy(at->co + bp_first_ball[bearing], co, sizeof co);                                                                     \
+        memcpy(at->si + bp_first_ball[bearing], si, sizeof si);                                                                     \
+        memcpy(at->k_##b[alike], k, sizeof k);                                                                                          \
     }
     BP_EACH_BEARING(BP_POINT)
 #undef BP_POINT
@@ -59,13 +59,13 @@ static inline void bp_sums_tangent(const bp_point *restrict at, const bp_directi
 {
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double c = at->r[BP_CAGE(b)], s = at->r[BP_CAGE(b) + 1];                                         \
-        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES;                             \
+        const double c = at->r[BP_CAGE], s = at->r[BP_CAGE + 1];                                         \
+        const double *const cd = rd + BP_CAGE * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], angle[BP_LANES];                                                                      \
-        bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
+        bp_##b##_numbers_lanes(alike, d->p, d->c, wd, kd);                                                                              \
         _Pragma("omp simd")                                                                                                      \
         for (int l = 0; l < BP_LANES; l++) angle[l] = c * sd[l] - s * cd[l];                                                     \
-        bp_##b##_sums_moved_lanes(at->total_##b, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, angle, kd, Sd + BP_##b##_FIRST_SUM * BP_LANES);                   \
+        bp_##b##_sums_moved_lanes(at->total_##b[alike], rd + bp_first_relative[bearing] * BP_LANES, angle, kd, Sd + bp_first_sum[bearing] * BP_LANES);                   \
     }
     BP_EACH_BEARING(BP_MOVED)
 #undef BP_MOVED
@@ -93,18 +93,18 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
     for (int i = 0; i < BP_NG * BP_LANES; i++) Gd[i] = 0.0;
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double *const cd = rd + BP_CAGE(b) * BP_LANES, *const sd = cd + BP_LANES;                             \
-        double kd[BP_##b##_NK * BP_LANES], *const to = Gd + BP_##b##_FIRST_SLOPE * BP_LANES;                                     \
-        bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
+        const double *const cd = rd + BP_CAGE * BP_LANES, *const sd = cd + BP_LANES;                             \
+        double kd[BP_##b##_NK * BP_LANES], *const to = Gd + bp_first_slope[bearing] * BP_LANES;                                     \
+        bp_##b##_numbers_lanes(alike, d->p, d->c, wd, kd);                                                                              \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
-            const int i = BP_##b##_FIRST_BALL + j;                                                                               \
+            const int i = bp_first_ball[bearing] + j;                                                                               \
             double cod[BP_LANES], sid[BP_LANES], moved[BP_##b##_SLOPES * BP_LANES];                                              \
             _Pragma("omp simd")                                                                                                  \
             for (int l = 0; l < BP_LANES; l++) {                                                                                 \
                 cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                      \
                 sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                      \
             }                                                                                                                    \
-            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + BP_##b##_FIRST_RELATIVE, at->k_##b, cod, sid, rd + BP_##b##_FIRST_RELATIVE * BP_LANES, kd,      \
+            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + bp_first_relative[bearing], at->k_##b[alike], cod, sid, rd + bp_first_relative[bearing] * BP_LANES, kd,      \
                                  moved);                                                                                         \
             _Pragma("omp simd")                                                                                                  \
             for (int m = 0; m < BP_##b##_SLOPES * BP_LANES; m++) to[m] += moved[m];                                              \
