@@ -15,26 +15,25 @@ static const int bp_group[4] = {0, 0, 0, 0};
 static const int bp_partner[4] = {2, 3, 0, 1};
 static const int bp_is_angle[4] = {0, 0, 0, 0};
 
-#define BP_EACH_BEARING(DO) DO(0)
+/* Of each bearing, where its entries begin behind those of the bearings before. */
+static const int bp_first_ball[2] = {0, 8};
+static const int bp_first_relative[2] = {0, 7};
+static const int bp_first_sum[2] = {0, 2};
+static const int bp_first_slope[2] = {0, 6};
 
-enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_FIRST_RELATIVE = 0, BP_0_SUMS = 2, BP_0_FIRST_SUM = 0, BP_0_SLOPES = 6, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 16, BP_0_TURNING = 3, BP_0_TURNING_BY = 1 };
+#define BP_EACH_STRUCTURE(DO) DO(0)
+#define BP_EACH_BEARING(DO) BP_ALIKE(0, DO)
+
+enum { BP_0_ALIKE = 1, BP_0_BALLS = 8, BP_0_NK = 3, BP_0_OF_P = 0, BP_0_OF_C = 3, BP_0_SUMS = 2, BP_0_SLOPES = 6, BP_0_PARTIALS = 16, BP_0_TURNING = 3, BP_0_TURNING_BY = 1 };
+
+static const int bp_0_bearings[1] = {0};
 
 static const double bp_0_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
 
 static const double bp_0_sin[8] = {0.0, 0.7071067811865476, 1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476};
 
-/* Numbers that the balls depend on. */
-static inline void bp_0_numbers(const double *restrict p, const double *restrict c, const double *restrict w, double *restrict k)
-{
-    (void)p;
-    (void)w;
-    double w0 = c[10];
-    k[0] = w0;
-    w0 = c[14];
-    k[1] = w0;
-    w0 = c[39];
-    k[2] = w0;
-}
+/* Numbers that the balls depend on: their places in p, then in c, then in w. */
+static const int bp_0_taken[1][3] = {{10, 14, 39}};
 
 /* Summands of the forces of the balls. 18 operations a ball. */
 static inline void bp_0_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)

@@ -5,7 +5,9 @@
 
 #include "kernels.h"
 
-enum { BP_EVENTS = 8, BP_0_FIRST_EVENT = 0, BP_0_SWITCHES = 1 };
+static const int bp_first_event[1] = {0};
+
+enum { BP_EVENTS = 8, BP_0_SWITCHES = 1 };
 
 /* Where the force above a kink, or below it, ends at a branch point; where it is one of the rate; where
    a rate comes with the switching function. */

@@ -103,16 +103,20 @@ def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels
 def _structure(index: int, alike: tuple[int, ...], bearings: tuple[BallKernels, ...], life: ElementLife) -> str:
     """Sizes of a structure, its balls' directions in the cage, and its kernels, the balls in lanes."""
     own = bearings[alike[0]]
+    kinds = [kind for kind, _ in own.taken]
     sizes = {
         "ALIKE": len(alike),
         "BALLS": own.balls,
         "NK": own.numbers,
+        "OF_P": kinds.count("p") if kinds else 1,
+        "OF_C": kinds.count("c"),
         "SUMS": own.sums,
         "SLOPES": own.slopes,
         "PARTIALS": own.partials,
         **_load_powers(life),
     }
     angles = [sp.Rational(2 * j, own.balls) * sp.pi for j in range(own.balls)]
+    taken = ["{" + (", ".join(str(place) for _, place in bearings[k].taken) or "0") + "}" for k in alike]
     names = ", ".join(bearings[k].prefix[:-1] for k in alike)
     name = f" of {names}" if names else ""
     words = {
@@ -126,43 +130,9 @@ def _structure(index: int, alike: tuple[int, ...], bearings: tuple[BallKernels, 
             _integers(f"bp_{index}_bearings", [*alike]),
             print_array(f"bp_{index}_cos", [float(sp.cos(a)) for a in angles]),
             print_array(f"bp_{index}_sin", [float(sp.sin(a)) for a in angles]),
-            _numbers(index, [bearings[k].taken for k in alike], name),
+            f"/* Numbers that the balls{name} depend on: their places in p, then in c, then in w. */\n"
+            f"static const int bp_{index}_taken[{len(alike)}][{own.numbers}] = {{{', '.join(taken)}}};",
             *(_of_balls(own.over_numbers[key], index, text) for key, text in words.items()),
-        ]
-    )
-
-
-def _numbers(index: int, taken: list[tuple[tuple[str, int], ...]], name: str) -> str:
-    """The numbers that balls depend on, of one state and of one in each lane."""
-    rows = ", ".join("{" + (", ".join(str(place) for _, place in of) or "0") + "}" for of in taken)
-    arguments = (
-        "const int alike, " + ", ".join(f"const double *restrict {kind}" for kind in "pcw") + ", double *restrict k"
-    )
-    used = {kind for kind, _ in taken[0]} | ({"alike"} if taken[0] else set())
-    unused = [f"    (void){argument};" for argument in ("alike", *"pcw") if argument not in used]
-    body = [f"k[{i}] = {kind}[bp_{index}_taken[alike][{i}]];" for i, (kind, _) in enumerate(taken[0])]
-    in_lanes = [
-        f"k[{i} * BP_LANES + lane] = {kind}[bp_{index}_taken[alike][{i}] * BP_LANES + lane];"
-        for i, (kind, _) in enumerate(taken[0])
-    ]
-    return "\n".join(
-        [
-            f"/* Numbers that the balls{name} depend on, and where they are. */",
-            f"static const int bp_{index}_taken[{len(taken)}][{max(len(taken[0]), 1)}] = {{{rows}}};",
-            f"static inline void bp_{index}_numbers({arguments})",
-            "{",
-            *unused,
-            *(f"    {line}" for line in body or ["k[0] = 0.0;"]),
-            "}",
-            "/* The same of a state in each lane. */",
-            f"static inline void bp_{index}_numbers_lanes({arguments})",
-            "{",
-            *unused,
-            "#pragma omp simd",
-            "    for (int lane = 0; lane < BP_LANES; lane++) {",
-            *(f"        {line}" for line in in_lanes or ["k[lane] = 0.0;"]),
-            "    }",
-            "}",
         ]
     )
 

@@ -15,8 +15,8 @@ acceleration_jacobian  (x, S, G, r, u, p, c, w) -> A, B     da/dq, da/dv (row-ma
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
 passes         (t, x, u, p, c) -> a         of each bearing: angle of ball 1 as the outer and the inner ring see it
 
-The balls enter by the kernels of `ball_kernels`, one set for each bearing: the driver loops over them, and the compiler
-makes SIMD lanes of the loop.  Text and compile time do not depend on their number.
+The balls enter by the kernels of `ball_kernels`, one set for alike bearings: the driver loops over these, the compiler
+makes SIMD lanes of the loop over balls.  Text and compile time do not depend on their number.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from itertools import accumulate, pairwise
 
 import casadi as ca
 import sympy as sp
+from sympy.utilities.iterables import sift
 
 from ballpass.derive.lowering.ball_kernels import BallBuilder, BallKernels
 from ballpass.derive.lowering.mass_matrix import accelerations
@@ -136,6 +137,10 @@ class KernelBuilder:
         """A stage variable, unless the expression is a constant of the run."""
         if self._visit.is_constant(expression):
             return self._visit(expression)
+        if isinstance(expression, sp.Mul) and len(self._system.bearings) > 1:
+            fixed, (moving, *more) = sift(expression.args, self._visit.is_constant, binary=True)
+            if fixed and not more and moving.is_Symbol:  # a load that bearings share is one stage variable
+                return self._visit(sp.Mul(*fixed)) * self._hoist(moving)
         if expression not in self._stage:
             self._stage[expression] = ca.SX.sym(f"w{len(self._stage)}")
         return self._stage[expression]

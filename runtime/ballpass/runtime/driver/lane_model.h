@@ -95,7 +95,7 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
 /* Numbers of the balls of a bearing. */
 #define BP_LANE_NUMBERS(b)                                \
     double numbers[BP_##b##_NK * BP_L] BP_ALIGNED;        \
-    bp_##b##_numbers_lanes(alike, n->p, n->c, w, numbers);
+    BP_NUMBERS(b, BP_LANES, n->p, n->c, w, numbers)
 
 /* A kernel of a bearing of structure b for all its directions (of opposite balls one), its first rows added up to S and the others to G, in the order of
    bp_total. */

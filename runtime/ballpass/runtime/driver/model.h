@@ -143,11 +143,24 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
     }
 }
 
+/* Numbers k of the balls of a bearing, of a state in each of the lanes: entries of p, of c and of w, whose places are `taken`. */
+static inline __attribute__((always_inline)) void bp_numbers_of(const int *restrict taken, const int count, const int of_p, const int of_c,
+                                                                const int lanes, const double *restrict p, const double *restrict c,
+                                                                const double *restrict w, double *restrict k)
+{
+    for (int i = 0; i < count; i++) {
+        const double *from = (i < of_p ? p : i < of_p + of_c ? c : w) + taken[i] * lanes;
+        for (int lane = 0; lane < lanes; lane++) k[i * lanes + lane] = from[lane];
+    }
+}
+
+#define BP_NUMBERS(b, lanes, p, c, w, k) bp_numbers_of(bp_##b##_taken[alike], BP_##b##_NK, BP_##b##_OF_P, BP_##b##_OF_C, lanes, p, c, w, k);
+
 /* Directions co, si and numbers k of the balls of bearing b, from the relative motion r and the stage variables w; room for `count` rows of summands. */
 #define BP_BALLS(b, count)                                                                                                    \
     double co[BP_##b##_BALLS], si[BP_##b##_BALLS], k[BP_##b##_NK], rows[(count) * BP_##b##_BALLS];                            \
     bp_ball_directions(r + BP_CAGE, bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
-    bp_##b##_numbers(alike, n->p, n->c, w, k);
+    BP_NUMBERS(b, 1, n->p, n->c, w, k)
 
 /* Rows from the `first` on, added up. */
 #define BP_TOTALS(b, first, count, to) \

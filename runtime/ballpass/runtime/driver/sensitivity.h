@@ -297,8 +297,8 @@ static inline void bp_switch_moved(const ballpass_tangents *tangents, bp_tangent
         const double co = bp_##b##_cos[j] * turn[0] - bp_##b##_sin[j] * turn[1], si = bp_##b##_sin[j] * turn[0] + bp_##b##_cos[j] * turn[1]; \
         double k[BP_##b##_NK], kd[BP_##b##_NK * BP_LANES], cod[BP_LANES], sid[BP_LANES];                                         \
         double moved[(BP_##b##_SWITCHES + 1) * BP_LANES];                                                                        \
-        bp_##b##_numbers(alike, n->p, n->c, points.w[0], k);                                                                            \
-        bp_##b##_numbers_lanes(alike, at.d.p, at.d.c, wd, kd);                                                                          \
+        BP_NUMBERS(b, 1, n->p, n->c, points.w[0], k)                                                                            \
+        BP_NUMBERS(b, BP_LANES, at.d.p, at.d.c, wd, kd)                                                                          \
         for (int l = 0; l < BP_LANES; l++) {                                                                                     \
             cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                          \
             sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                          \

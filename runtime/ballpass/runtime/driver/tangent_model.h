@@ -62,7 +62,7 @@ static inline void bp_sums_tangent(const bp_point *restrict at, const bp_directi
         const double c = at->r[BP_CAGE], s = at->r[BP_CAGE + 1];                                         \
         const double *const cd = rd + BP_CAGE * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], angle[BP_LANES];                                                                      \
-        bp_##b##_numbers_lanes(alike, d->p, d->c, wd, kd);                                                                              \
+        BP_NUMBERS(b, BP_LANES, d->p, d->c, wd, kd)                                                                              \
         _Pragma("omp simd")                                                                                                      \
         for (int l = 0; l < BP_LANES; l++) angle[l] = c * sd[l] - s * cd[l];                                                     \
         bp_##b##_sums_moved_lanes(at->total_##b[alike], rd + bp_first_relative[bearing] * BP_LANES, angle, kd, Sd + bp_first_sum[bearing] * BP_LANES);                   \
@@ -95,7 +95,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
     {                                                                                                                            \
         const double *const cd = rd + BP_CAGE * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], *const to = Gd + bp_first_slope[bearing] * BP_LANES;                                     \
-        bp_##b##_numbers_lanes(alike, d->p, d->c, wd, kd);                                                                              \
+        BP_NUMBERS(b, BP_LANES, d->p, d->c, wd, kd)                                                                              \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
             const int i = bp_first_ball[bearing] + j;                                                                               \
             double cod[BP_LANES], sid[BP_LANES], moved[BP_##b##_SLOPES * BP_LANES];                                              \
