@@ -148,8 +148,10 @@ static inline __attribute__((always_inline)) void bp_numbers_of(const int *restr
                                                                 const int lanes, const double *restrict p, const double *restrict c,
                                                                 const double *restrict w, double *restrict k)
 {
+#pragma GCC unroll 32
     for (int i = 0; i < count; i++) {
-        const double *from = (i < of_p ? p : i < of_p + of_c ? c : w) + taken[i] * lanes;
+        const double *restrict from = (i < of_p ? p : i < of_p + of_c ? c : w) + taken[i] * lanes;
+#pragma omp simd
         for (int lane = 0; lane < lanes; lane++) k[i * lanes + lane] = from[lane];
     }
 }
