@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ballpass.runtime.plot.style import GREY, MANY, caption, caption_of, log_ticks, new_figure, save, styled
+from benchmarks.first_use import ASKED
 from benchmarks.work_precision import LEVELS, curve, time_at
 
 Result = Mapping[str, Any]
@@ -39,6 +40,7 @@ def write(parts: Mapping[str, Result], page: Path) -> None:
         "ensembles": _ensembles,
         "sensitivities": _sensitivities,
         "preparation": _preparation,
+        "first_use": _first_use,
     }
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
     summary = _summary(parts["work_precision"]["result"]) if "work_precision" in parts else []
@@ -243,4 +245,30 @@ def _preparation(result: Result, _: Path) -> list[str]:
         "percentile.",
         "",
         *table(["", "seconds"], [[words, measured(value)] for words, value in result["steps"].items()]),
+    ]
+
+
+def _first_use(result: Result, _: Path) -> list[str]:
+    least = result["1 alike bearing"]
+
+    def row(words: str, own: Result) -> list[str]:
+        compilers = [own[asked][0] for asked in ASKED]
+        grown = [f"{own[asked][0] / least[asked][0]:.2f}" for asked in ASKED]
+        return [
+            words,
+            f"{own['kilobytes']:.0f}",
+            *(f"{sum(own[asked]):.1f} ({own[asked][0]:.1f})" for asked in ASKED),
+            f"{compilers[1] / compilers[0]:.2f}, {compilers[2] / compilers[0]:.2f}",
+            ", ".join(grown) if "alike" in words else "",
+        ]
+
+    head = ["", "kB of C", *(f"first {asked}" for asked in ASKED), "sweep, sensitivity over run", "over one bearing"]
+    return [
+        "## What is asked for the first time",
+        "",
+        "Processor seconds of a question in a new process with an empty cache, in brackets those of the compiler; the "
+        "compiler's for a first sweep and a first sensitivity over those for a first run; those for run, sweep and "
+        "sensitivity over those of one bearing. Alike bearings have elastic outer rings and share the press load.",
+        "",
+        *table(head, [row(words, own) for words, own in result.items()]),
     ]
