@@ -12,7 +12,7 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
 from ballpass.runtime.show.short import ShortRepr
 
-SCHEMA = 7
+SCHEMA = 8
 FILE_NAME = "manifest.json"
 
 #: Name of the input that holds the slope of a driver's table of speed over time.
