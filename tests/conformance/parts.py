@@ -129,6 +129,7 @@ _STEEL = 'young_modulus = "207 GPa"\npoisson_ratio = 0.3'
 ELEMENT_CONTACTS = {
     "ball": f'inner_groove_radius = "4.1275 mm"\nouter_groove_radius = "4.206875 mm"\n{_STEEL}',
     "cylindrical-roller": f'length = "8 mm"\n{_STEEL}',
+    "power-law": 'force = "800 N"\ndeflection = "20 um"\nexponent = 1.3',
 }
 
 

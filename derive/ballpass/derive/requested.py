@@ -147,7 +147,7 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     out.append(_of_balls(names, "ball.stiffness", slope, "N/m", words))
     element = ELEMENTS[bearing.element]
     if bearing.contact.smoothing is None:  # k delta^n from 0 on
-        energy = count * force * ball.deflection / (element.exponent + 1)
+        energy = count * force * ball.deflection / (element.power_law(bearing, names)[1] + 1)
         words = f"Potential energy of the elastic forces of all {element.noun}s{of}"
         out.append(_of_balls(names, "contact.energy", energy, "J", words, over_balls=True))
     contact = f"each {element.noun}'s contact{of}"

@@ -195,11 +195,8 @@ def _ball(
     def optional(quantity: object) -> sp.Expr | None:
         return None if quantity is None else symbol_of(quantity)  # type: ignore[arg-type]
 
-    contact = Contact(
-        stiffness=names.constant("k_b"),
-        exponent=ELEMENTS[bearing.element].exponent,
-        width=optional(bearing.contact.smoothing),
-    )
+    factor, exponent = ELEMENTS[bearing.element].power_law(bearing, names)
+    contact = Contact(stiffness=factor, exponent=exponent, width=optional(bearing.contact.smoothing))
     rest = SmoothedRest(width=optional(bearing.damping.smoothing))
     delta, delta_rate = names.variable("ball.deflection"), names.variable("ball.deflection_rate")
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))

@@ -202,7 +202,9 @@ def _look(
     above: bool,
     paired: bool,
 ) -> _SwitchPlace:
-    """How the two branches of a condition meet, tried with exact numbers of about one for everything else.
+    """How the two branches of a condition meet, tried with exact numbers little above one for everything else.
+
+    A symbolic exponent is then one that is just above its least value, where a law is the least smooth.
 
     Parameters
     ----------
@@ -210,7 +212,7 @@ def _look(
     paired : whether an opposite ball has the same force with the opposite sign of what decides
     """
     rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
-    numbers = {symbol: sp.Rational(sp.prime(k + 10), 37) for k, symbol in enumerate(rest)}
+    numbers = {symbol: 1 + sp.Rational(sp.prime(k + 10), 370) for k, symbol in enumerate(rest)}
     meets = start.xreplace(numbers)
     least = math.inf
     ends_above = ends_below = False

@@ -46,7 +46,7 @@ ELEMENT = ChoiceKey(
     words="Kind of the rolling elements",
     choices=ELEMENTS,
     default=next(iter(ELEMENTS)),
-    note='in names of other keys and of outputs "ball" stands for either',
+    note='in names of other keys and of outputs "ball" stands for all',
 )
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))
 SUPPORT = ChoiceKey(words="Support of the outer ring", choices=("elastic", "fixed"), note="fixed: nothing else")

@@ -131,9 +131,10 @@ def _bearing() -> Iterator[Section]:
     yield _of("bearing.lubrication", bearing_records.Lubrication)
     yield _of("bearing.alignment", bearing_records.Alignment)
     for element in ELEMENTS.values():
-        yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)
+        if element.derived is not element.given:
+            yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)
+            yield _of("bearing.contact.ball_material", bearing_records.Material, fill=element.element_material)
         yield _of("bearing.contact", element.given)
-        yield _of("bearing.contact.ball_material", bearing_records.Material, fill=element.element_material)
     smoothing = keys_of(bearing_records.Damping)
     laws = {name: ({**law.keys, **(smoothing if law.kinked_at_rest else {})}, law.one_of) for name, law in LAWS.items()}
     yield from _variants("bearing.damping", read_bearing.LAW, "law", laws)

@@ -97,19 +97,18 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
         if not is_free(manifest):
             turning = "crank" if manifest.mechanism is not None else "shaft"
             place += f", {turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
-        pressure, ring = max(
-            (float(contact.peak_pressure(force)), ring)
-            for contact, ring in zip(contacts_of(bearing, values), ("inner", "outer"), strict=True)
-        )
         element = rated_element(bearing)
-        if pressure > element.static_pressure:
-            beyond.append(element)
         whose = f" of {bearing.name}" if bearing.name else ""
-        number = written(peak, "total", 1.0)
-        said.append(
-            f"Highest {element.noun} force{whose}: {number} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} "
-            "raceway."
-        )
+        said.append(f"Highest {element.noun} force{whose}: {written(peak, 'total', 1.0)} N ({place})")
+        if not element.unrated:
+            pressure, ring = max(
+                (float(contact.peak_pressure(force)), ring)
+                for contact, ring in zip(contacts_of(bearing, values), ("inner", "outer"), strict=True)
+            )
+            said[-1] += f", {pressure / 1e6:.0f} MPa on the {ring} raceway"
+            if pressure > element.static_pressure:
+                beyond.append(element)
+        said[-1] += "."
     limits = {element.noun: element.static_pressure for element in beyond}
     said += [
         f"Above {limit / 1e6:.0f} MPa (ISO 76) a dent of about a ten-thousandth of the {noun}'s diameter remains: see "

@@ -19,7 +19,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.quantity.kinds.life import PLACES
-from ballpass.runtime.ratings.of_bearing import ratings_of
+from ballpass.runtime.ratings.of_bearing import rated_element, ratings_of
 
 #: What a page calls; memory for what it reads is the module's.
 CALLED = (
@@ -98,11 +98,13 @@ def _drawn(model: LoadedModel) -> casadi.Function:
 
 
 def _ratings(model: LoadedModel) -> casadi.Function:
-    """Q_ci and Q_ce of every bearing, one below the other, over p and c."""
+    """Q_ci and Q_ce of every bearing, one below the other, over p and c; 0 of one that no standard rates."""
     manifest = model.manifest
     names = {"p": [info.name for info in manifest.parameters], "c": [info.name for info in manifest.constants]}
     given = {kind: casadi.SX.sym(kind, len(some)) for kind, some in names.items()}
     known = {name: given[kind][k] for kind, some in names.items() for k, name in enumerate(some)}
-    found = [ratings_of(bearing, known) for bearing in manifest.bearings]
-    rows = [load for one in found for load in (one.inner_ball, one.outer_ball)]
+    rows: list[casadi.SX | float] = []
+    for bearing in manifest.bearings:
+        found = None if rated_element(bearing).unrated else ratings_of(bearing, known)
+        rows += [0.0, 0.0] if found is None else [found.inner_ball, found.outer_ball]
     return casadi.Function("ratings", [*given.values()], [casadi.vertcat(*rows)], [*given], ["y"])

@@ -56,11 +56,13 @@ def life_report(
     Raises
     ------
     RequestError
-        The scene has no bearing, or a wrong request.
+        The scene has no bearing, or one that no standard rates, or a wrong request.
     SimulationError
         The computation failed.
     """
     manifest = model.manifest
+    for info in manifest.bearings:  # before the run
+        geometry_of(info, model.numbers(parameters).values)
     states = manifest.duty or (DutyInfo(name="", share=1.0, parameters=()),)
     judged = [_state(model, {**parameters, **dict(state.parameters)}, state, request) for state in states]
     return LifeReport(

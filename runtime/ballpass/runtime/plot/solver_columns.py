@@ -172,8 +172,10 @@ def _bearing(
     }
 
 
-def _life(rows: ReductionRows, bearing: BearingInfo) -> dict[str, float]:
+def _life(rows: ReductionRows, bearing: BearingInfo) -> dict[str, float] | None:
     """How a life depends on the loads, see `ballpass.runtime.ratings.life.ElementLife`, and where they are reduced."""
+    if rated_element(bearing).unrated:
+        return None
     of, turned = rated_element(bearing).life, bearing.prefix + TURNED
     return {
         "wanted": rows.columns["integral_wanted", turned],

@@ -91,7 +91,15 @@ def rated_element(bearing: BearingInfo) -> RatedElement:
 
 
 def geometry_of(bearing: BearingInfo, values: Mapping[str, Any]) -> ElementGeometry:
-    """What the bearing's elements are rated by; `values` are parameters by name [SI]."""
+    """What the bearing's elements are rated by; `values` are parameters by name [SI].
+
+    Raises
+    ------
+    RequestError
+        No standard rates them.
+    """
+    if unrated := rated_element(bearing).unrated:
+        raise RequestError(f"{bearing.path}: {unrated} Allowed without: forces and motion.")
     contact, nominal = f"{bearing.path}.contact.", values.get(f"{bearing.path}.contact_angle")
     return ElementGeometry(
         balls=bearing.balls,
@@ -137,6 +145,8 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
     values : parameters and derived constants by name
     shaft_speed : of driver or shaft [rad/s]
     """
+    if unrated := rated_element(bearing).unrated:
+        return unrated
     if turns_steadily(bearing, values, shaft_speed):
         return ""
     name = f"The bearing {bearing.name}" if bearing.name else "The bearing"

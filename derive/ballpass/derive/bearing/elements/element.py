@@ -22,7 +22,6 @@ from ballpass.derive.scene.read_keys import Either, keys_of, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Words
-from ballpass.runtime.ratings.elements import RATED, RatedElement
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
@@ -54,11 +53,6 @@ class RollingElement(ABC):
     derived: ClassVar[type[Any]]
     given: ClassVar[type[Any]]
     contact_words: ClassVar[str]
-
-    @property
-    def rated(self) -> RatedElement:
-        """The element as standards rate it."""
-        return RATED[self.name]
 
     @property
     def stiffness_unit(self) -> str:
@@ -114,6 +108,10 @@ class RollingElement(ABC):
             way, factors = self.ring_stiffnesses(bearing, names)
             stiffness = self.in_series(factors)
         return [*way, names.define(names.constant("k_b"), stiffness, self.stiffness_unit, total, "k_b")]
+
+    def power_law(self, bearing: Bearing, names: Names) -> tuple[sp.Expr, sp.Expr]:
+        """Factor and exponent of the deflection in the elastic force."""
+        return names.constant("k_b"), self.exponent
 
     def in_series(self, factors: Sequence[sp.Expr]) -> sp.Expr:
         """Stiffness factor of contacts whose deflections add up."""

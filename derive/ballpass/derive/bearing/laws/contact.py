@@ -31,11 +31,11 @@ RAMP_ERROR = 5.0 / 32.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Contact of one element: its stiffness k_b, the exponent n of the deflection (of balls 3/2), and the half width of
+    """Contact of one element: its factor k_b, the exponent n of the deflection (of balls 3/2), and the half width of
     its smoothed onset [m], or None."""
 
     stiffness: sp.Expr
-    exponent: sp.Rational
+    exponent: sp.Expr
     width: sp.Expr | None = None
 
     def force(self, delta: sp.Expr) -> sp.Expr:

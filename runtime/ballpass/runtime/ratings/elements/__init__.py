@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from ballpass.runtime.contract.plugins import Registry
 from ballpass.runtime.ratings.elements.ball import RatedBall
 from ballpass.runtime.ratings.elements.cylindrical_roller import RatedCylindricalRoller
+from ballpass.runtime.ratings.elements.power_law import RatedPowerLaw
 from ballpass.runtime.ratings.elements.rated import ElementGeometry, RacewayContact, RatedElement
 
 #: Elements by their name in the scene file.
 RATED: Registry[RatedElement] = Registry(
-    "rated_elements", "rated rolling element", RatedElement, (RatedBall(), RatedCylindricalRoller())
+    "rated_elements", "rated rolling element", RatedElement, (RatedBall(), RatedCylindricalRoller(), RatedPowerLaw())
 )
 
 

@@ -96,8 +96,10 @@ class RatedElement(ABC):
     middle : where wear is measured from, in a table
     static_pressure : peak pressure that leaves a dent of 1e-4 of its diameter, ISO 76 [Pa]
     life : how its life depends on its load
+    unrated : why no standard rates it; empty where one does
     """
 
+    unrated: ClassVar[str] = ""
     name: ClassVar[str]
     noun: ClassVar[str]
     limit_words: ClassVar[str]
