@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import IntegrationError, Model, RequestError, Status
+from ballpass.runtime.request import assembly
 
 #: The press with a rod [m] shorter than its crank: hinge B stands ``crank |cos(angle)|`` beside the slider's guide.
 ROD, CRANK = 5e-3, 6e-3
@@ -109,6 +110,25 @@ def test_a_gap_between_the_angles_of_the_sweep_is_found(press: Model) -> None:
     numbers = {"mechanism.bodies.crank.points.B": 0.1 * (1.0 + 1e-7), START: turned + math.radians(90.0)}
     with pytest.raises(RequestError, match=r"cannot be assembled at joint 'C' at crank angle"):
         press.check_assembly(numbers)
+
+
+def test_a_constant_margin_has_no_minima_to_refine(
+    make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The axes of a gear stay as far apart: the check of each run took a hundred times as long as the run itself."""
+    model, asked, plain = make_model("geared_five_bar"), [], assembly.margins_at
+
+    def counted(*given: Any) -> np.ndarray:
+        rows = plain(*given)
+        asked.append(rows)
+        return rows
+
+    monkeypatch.setattr(assembly, "margins_at", counted)
+    model.check_assembly({"mechanism.bodies.left.points.C": 0.1311})  # numbers that no other test has checked
+    rows = asked[0]
+    assert np.sum(np.ptp(rows, axis=0) < 1e-12) == 1
+    assert len(rows) == 1440  # the machine repeats after two turns
+    assert 1 < len(asked) <= 20
 
 
 def test_members_of_an_ensemble_are_refused_by_their_own_runs(four_bar: Model) -> None:

@@ -116,15 +116,15 @@ def _valid_angles(model: LoadedModel, numbers: Numbers, mechanism: MechanismInfo
     angles = TURN * np.arange(ANGLES * turns) / ANGLES
     rows = margins(angles)
     least = rows.min(axis=0)
-    minima = (rows <= np.roll(rows, 1, axis=0)) & (rows <= np.roll(rows, -1, axis=0))
+    minima = (rows < np.roll(rows, 1, axis=0)) & (rows <= np.roll(rows, -1, axis=0))  # none where a margin is constant
     minima &= (rows > DEAD_CENTER) & ((rows < NEAR) | (rows == least))
     finer = [_lowest(margins, int(row), float(angles[k])) for k, row in np.argwhere(minima)]
-    if least.min() > DEAD_CENTER and all(margins(np.array([a]))[0].min() > DEAD_CENTER for a in finer):
-        return None
     # a minimum between the last angle and the first lies before the start
     places = np.unique(np.concatenate([angles, past(np.array(finer, dtype=float), turns=turns)]))
     rows = margins(places)
     bad = np.flatnonzero(rows.min(axis=1) <= DEAD_CENTER)
+    if not len(bad):
+        return None
     start = math.degrees(timeline.start_angle(model.manifest, numbers.values))
     if bad[0] == 0:
         row = int(np.argmax(rows[0] <= DEAD_CENTER))
