@@ -481,6 +481,24 @@ def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Call
         assert any(np.allclose(end, lug) for bar in bars for end in bar)
 
 
+def test_pictures_hold_the_whole_wheels_of_a_gear(make_virtual: Callable[..., Model]) -> None:
+    """The wheel of 80 mm is in no joint's way: figure and page cut it off at its axis."""
+    model = make_virtual("geared_five_bar")
+    record = gather(model, model.simulate(cycles=2, transient=0, samples_per_cycle=40))
+    axes = Figure().add_subplot()
+    draw_mechanism(axes, record, 0)
+    box = np.array([axes.get_xlim(), axes.get_ylim()])
+    wheels = {(0.0, 0.0): 0.040, (0.120, 0.0): 0.080}
+    drawn = {tuple(np.round(p.center, 6)): p.radius for p in axes.patches if isinstance(p, Circle) and p.radius > 0.03}
+    assert drawn == pytest.approx(wheels)
+    linkage = to_plain(choose_frames([record], 0.05))["linkage"]
+    page = np.array([linkage["low"], linkage["high"]])
+    for centre, radius in wheels.items():
+        for low, high in (box.T, page):
+            assert np.all(low <= np.array(centre) - radius + 1e-9)
+            assert np.all(np.array(centre) + radius - 1e-9 <= high)
+
+
 def test_a_spring_pulls_what_moves_towards_its_other_end(make_virtual: Callable[..., Model]) -> None:
     """With stiffness times elongation."""
     spring = """[mechanism.springs.hold]

@@ -17,6 +17,7 @@ from ballpass.runtime.plot.record import FRAME, Array, Record
 from ballpass.runtime.plot.shapes import (
     DrawnForce,
     coupler_points,
+    drawn_corners,
     drawn_forces,
     exaggeration,
     guide_direction,
@@ -155,7 +156,7 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
     poses = [record.points(float(record.t[k]), record.state(int(k))) for k in samples]
     paths = {key: np.array([pose[key] for pose in poses]) for key in poses[0]}  # (frames, 2) [m]
     used = used_points(mechanism)
-    corners = np.vstack([paths[key] for key in used])
+    corners = drawn_corners(mechanism, paths)
     low, high = corners.min(axis=0), corners.max(axis=0)
     shown = shown_points(mechanism)
     guides = []

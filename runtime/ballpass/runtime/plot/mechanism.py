@@ -15,7 +15,16 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import Points, coupler_points, drawn_forces, guide_direction, links, used_points
+from ballpass.runtime.plot.shapes import (
+    Points,
+    coupler_points,
+    drawn_corners,
+    drawn_forces,
+    guide_direction,
+    links,
+    pitch_circles,
+    used_points,
+)
 from ballpass.runtime.plot.style import APPLIED, GREY, INK, SIGNAL, TORQUE, arrow, write
 from ballpass.runtime.report.numbers import rounded
 
@@ -88,7 +97,7 @@ def view(record: Record, samples: Sequence[int]) -> MechanismView:
         else [record.points(float(record.t[samples[0]] + length * k / _TRACE)) for k in range(_TRACE + 1)]
     )
     trace: Points = {key: np.array([pose[key] for pose in turn]) for key in turn[0]}
-    everything = np.vstack([trace[key] for key in used_points(record.mechanism)])
+    everything = drawn_corners(record.mechanism, trace)
     size = max(float(np.max(np.ptp(everything, axis=0))), 1e-9)
     forces = [_forces(record, pose, k) for pose, k in zip(poses, samples, strict=True)]
     greatest = max((one.strength for now in forces for one in now), default=0.0)
@@ -138,11 +147,8 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
             direction = guide_direction(now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
             words.avoid(now[second, block] - 0.1 * size * direction, now[second, block] + 0.1 * size * direction, 0.1)
-    for *ends, share in mechanism.wheels:  # pitch circles
-        one, other = now[ends[0], ends[1]], now[ends[2], ends[3]]
-        for at, part in ((one, share), (other, 1.0 - share)):
-            radius = abs(part) * float(np.hypot(*(other - one)))
-            axes.add_patch(Circle(tuple(at), radius, fill=False, edgecolor=GREY, linewidth=1.2, zorder=1.5))
+    for at, radius in pitch_circles(mechanism, now):
+        axes.add_patch(Circle(tuple(at), float(radius), fill=False, edgecolor=GREY, linewidth=1.2, zorder=1.5))
     for _, *ends in mechanism.springs:
         one, other = (now[ends[k], ends[k + 1]] for k in (0, 2))
         _draw_spring(axes, one, other, size)

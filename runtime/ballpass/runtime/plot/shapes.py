@@ -41,6 +41,22 @@ def _acting_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
     return list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces), *pulled]))
 
 
+def pitch_circles(mechanism: MechanismInfo, points: Points) -> list[tuple[Array, Array]]:
+    """Centres and radii of the wheels in mesh: of places (2,), (), or of places over time (times, 2), (times,) [m]."""
+    found = []
+    for *ends, share in mechanism.wheels:
+        one, other = points[ends[0], ends[1]], points[ends[2], ends[3]]
+        apart = np.hypot(*(other - one).T)
+        found += [(one, abs(share) * apart), (other, abs(1.0 - share) * apart)]
+    return found
+
+
+def drawn_corners(mechanism: MechanismInfo, points: Points) -> Array:
+    """Places over time that a picture holds, those around pitch circles as well, (places, 2) [m]."""
+    circles = [at + sign * r[:, None] for at, r in pitch_circles(mechanism, points) for sign in (-1.0, 1.0)]
+    return np.vstack([*(points[key] for key in used_points(mechanism)), *circles])
+
+
 def links(used: list[tuple[str, str]], now: Points, size: float) -> list[tuple[str, list[tuple[str, str]]]]:
     """Each moving body with the corners of its figure: two ends of a bar, those of a plate in order, or one point.
 
