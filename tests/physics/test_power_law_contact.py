@@ -116,7 +116,7 @@ def test_derivatives_by_the_numbers_of_the_law_are_verified(rotor: Model) -> Non
         changed = {wrt[0]: EXPONENT + sign * step}
         values.append(rotor.quantities(asked, **length, rtol=1e-12, parameters=changed))
     for pair in report.pairs[::3]:
-        ends = [float(found[pair.quantity]) for found in values]
+        ends = [found[pair.quantity].value for found in values]
         assert pair.derivative == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5), pair.quantity
 
 
