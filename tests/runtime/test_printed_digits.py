@@ -24,7 +24,7 @@ from ballpass.runtime.app import repeated as repeating
 from ballpass.runtime.app import summary, summary_table, summary_words
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands import declared, run
-from ballpass.runtime.report.digits import SCATTER
+from ballpass.runtime.report.digits import SCATTER, scatters
 from ballpass.runtime.report.report import Report, ReportTable
 
 COUNT = int(os.environ.get("BALLPASS_PRINTED", "3"))
@@ -187,3 +187,17 @@ def test_every_printed_number_of_a_scene_with_random_numbers_holds(
     marked = check(printed, "run", f"{scene}.toml", "--no-figures", *settings(model, seed))
     if seed in (4, 10):
         assert (marked > 5) is (seed == 10)
+
+
+def test_a_zero_among_large_numbers_is_no_sign_of_chaos() -> None:
+    """The push of teeth that change their flank falls to zero: 1e-6 N of 164 N, another 1e-6 N at each tolerance."""
+
+    def summarized(least: float, greatest: float) -> Report:
+        row = "Force on the frame at M, x", "", f"{least:.4g}", f"{greatest:.4g}", "", "N"
+        return Report(title="", parts=[ReportTable(heads=("", "value", "min", "max", "rms", "unit"), rows=[row])])
+
+    assert not scatters([summarized(1e-6, 164.3), summarized(3e-6, 164.3)])
+    assert scatters([summarized(1e-6, 164.3), summarized(3e-6, 165.3)])
+    assert scatters([summarized(0.01, 0.02), summarized(0.01, 0.03)])
+    cells = [Report(title="", parts=[ReportTable(heads=("a", "b"), rows=[(x, "500")])]) for x in ("0.1", "0.2")]
+    assert scatters(cells)

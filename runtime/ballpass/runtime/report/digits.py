@@ -215,13 +215,23 @@ def _shared_rows(tables: Sequence[ReportTable], least: int) -> list[Sequence[Wor
 
 
 def scatters(reports: Sequence[Report]) -> bool:
-    """Whether numbers of reports differ by more than `SCATTER`."""
+    """Whether numbers of reports differ by more than `SCATTER`: of themselves, or of the largest of one quantity."""
     found: Report = shared(reports, least=LEAST + 1)
     texts = list(found.warnings)
     for part in found.parts:
-        texts += [str(cell) for row in part.rows for cell in row] if isinstance(part, ReportTable) else [str(part)]
-    pairs = _PLUS_MINUS.findall("\n".join(texts))
-    return any(float(apart) > SCATTER * abs(float(value)) for value, apart in pairs)
+        if not isinstance(part, ReportTable):
+            texts.append(str(part))
+        elif "min" in part.heads:  # of one quantity
+            texts += ["\n".join(map(str, row[1:])) for row in part.rows]
+        else:
+            texts += [str(cell) for row in part.rows for cell in row]
+
+    def differ(text: str) -> bool:
+        pairs = [(abs(float(value)), float(apart)) for value, apart in _PLUS_MINUS.findall(text)]
+        sizes = [abs(float(number)) for number in _NUMBER.findall(text)] if "\n" in text else [0.0]
+        return any(apart > SCATTER * max(value, *sizes) for value, apart in pairs)
+
+    return any(map(differ, texts))
 
 
 def uncertainties(plain: Sequence[Any], least: float, size: float = 0.0) -> Any:
