@@ -184,6 +184,57 @@ def test_a_driver_that_a_torque_turns_stops_where_the_linkage_locks(
     assert [(one.member, one.status) for one in many.failures] == [(0, "LOCKED")]
 
 
+#: A crank-slider whose rod is hardly longer than its crank of 50 mm, with a bearing in the crank pin.
+PLAYING = """
+[mechanism.driver]
+joint = "A"
+speed = "60 rad/s"
+[mechanism.frame.points]
+A = "origin"
+[mechanism.bodies]
+crank = { mass = "0.4 kg", inertia = "300 kg*mm^2", center_of_mass = "0 mm", points = { A = "origin", B = "50 mm" } }
+rod = { mass = "0.6 kg", inertia = "1500 kg*mm^2", center_of_mass = "20 mm", points = { B = "origin", C = "50.05 mm" } }
+slider = { mass = "1.2 kg", center_of_mass = "origin", points = { C = "origin" } }
+[mechanism.joints]
+A = { type = "revolute", bodies = ["frame", "crank"] }
+B = { type = "revolute", bodies = ["crank", "rod"] }
+C = { type = "revolute", bodies = ["rod", "slider"], branch = "ahead" }
+D = { type = "prismatic", bodies = ["frame", "slider"], points = ["A", "C"], direction = "0 deg" }
+[bearing]
+joint = "B"
+coupling = "two-way"
+designation = "6204"
+clearance = "0.2 mm"
+[bearing.damping]
+law = "tangent"
+ratio = "0.25e-5 s"
+[bearing.outer_ring]
+support = "fixed"
+[bearing.inner_ring]
+body = "crank"
+[run]
+cycles = 1
+transient_cycles = 0
+outputs = ["inner.*", "point.rod.B.y"]
+"""
+
+
+@pytest.mark.filterwarnings("ignore::ballpass.runtime.UnusualWarning")
+def test_play_that_brings_a_linkage_to_its_dead_centre_ends_the_run_with_the_reason(
+    model_of: Callable[..., Model],
+) -> None:
+    """The ideal linkage turns round; with play the pin comes as far from the guide as the rod is long."""
+    model, rod = model_of(PLAYING), "mechanism.bodies.rod.points.C"
+    model.check_assembly()
+    with pytest.raises(IntegrationError, match=r"(?s)less play.*Joint 'C' locks \(.*: margin") as stopped:
+        model.simulate()
+    assert stopped.value.status is Status.LOCKED
+    assert 0.01 < stopped.value.time < 0.03  # near 90 deg of the crank
+    assert np.max(np.abs(stopped.value.partial["point.rod.B.y"])) < 50.05e-3
+    longer = model.simulate(duration=0.03, parameters={rod: 0.052})
+    assert np.max(np.abs(longer["point.rod.B.y"])) > 50.05e-3
+
+
 def test_a_driver_that_a_torque_turns_is_refused_where_the_linkage_branches(model_of: Callable[..., Model]) -> None:
     model = model_of(BY_TORQUE.format(torque=400, crank=1.0))
     with pytest.raises(RequestError, match=r"branches at joint 'C' at crank angle 90\.00 deg"):

@@ -158,6 +158,9 @@ class _Lowering:
                 ("geometry", {"points": ca.vertcat(*coordinates)}, "coordinates of all points and centres of mass [m]"),
                 ("assembly", {"margins": ca.vertcat(*margins)}, "positive while each dyad can be assembled"),
             ]
+            if system.linkage.play:
+                played = ca.vertcat(*(self.visit(m.expression) for m in system.linkage.margins))
+                bodies.append(("assembly_with_play", {"margins": played}, "the same where joints have play"))
         if system.reactions is not None:
             reactions, visit = system.reactions, self._moving(self.visit, balls)
             rows, columns = reactions.matrix.shape

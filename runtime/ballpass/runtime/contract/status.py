@@ -35,7 +35,7 @@ class Status(Enum):
     )
     LOCKED = (
         "The driver has come to the end of its range, or to where the linkage locks. Take a shorter run, loads or a "
-        "torque with which the driver turns back before, or other lengths."
+        "torque with which the driver turns back before, less play of bearings coupled two-way, or other lengths."
     )
     VOID = "The rings moved as they do in no bearing."
     INTEGRATOR_FAILED = (

@@ -103,7 +103,10 @@ def locked_words(model: LoadedModel, numbers: Numbers, time: float, state: np.nd
     if mechanism is None or not mechanism.margins:
         return ""
     u = timeline.inputs_at(model.manifest, numbers.values, time)
-    margins = model.kernel("assembly")({"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c})
+    played = any(bearing.two_way for bearing in model.manifest.bearings)
+    margins = model.kernel("assembly_with_play" if played else "assembly")(
+        {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
+    )
     k = int(np.argmin(margins))
     if margins[k] > 10.0 * LOCKED:
         return ""
