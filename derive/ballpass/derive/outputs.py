@@ -79,9 +79,7 @@ def mechanism_outputs(linkage: Linkage, reactions: Reactions) -> list[Output]:
         if name in reactions.joint_moment:
             words = f"Moment of the {second} on the {first} at {name}"
             rows.append((f"reaction.{name}.moment", reactions.joint_moment[name], "N*m", words))
-    for gear in linkage.mechanism.gears:
-        name, words = f"gear.{gear.name}.force", f"Force of gear {gear.name} along its line of action"
-        rows.append((name, sp.Symbol(name, real=True), "N", words))
+    rows += [row for dyad in linkage.dyads for row in dyad.outputs]
     drive = linkage.drive
     torque = reactions.drive_torque if drive.torque is None else drive.torque
     rows.append(("drive_torque", torque, "N*m", "Torque of the drive on the driven body, counter-clockwise"))

@@ -10,7 +10,6 @@ from dataclasses import asdict
 from ballpass.derive.emit.signature import duty_info, info_of, life_info, plugins_of, signature, versions
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
-from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.scene.records import FRAME, quantities_of
@@ -101,11 +100,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         driver=mechanism.driver.joint,
         turns=tuple((f.label, f.law.turns) for f in mechanism.forces if getattr(f.law, "turns", 1) > 1),
         repeats=linkage.turns,
-        wheels=tuple(
-            (*sum(zip(gear.mesh.bodies, gear.mesh.points, strict=True), ()), float(gear.lever))
-            for gear in linkage.dyads
-            if isinstance(gear, GearPair) and gear.gear.radius is None
-        ),
+        wheels=tuple(dyad.circles for dyad in linkage.dyads if dyad.circles is not None),
         springs=drawn_springs(mechanism),
     )
 

@@ -70,11 +70,13 @@ class Mesh:
     Attributes
     ----------
     joint : the gear as a joint, at points on the axes
+    size : unknown [N]
     direction : of the force on its first body, of tangential part one
     shifts : from these points to where the force acts, in the frame's axes [m]
     """
 
     joint: Joint
+    size: sp.Symbol
     direction: Pair
     shifts: tuple[Pair, Pair]
 
@@ -170,9 +172,9 @@ class Balance:
         )
 
     def _teeth(self, mesh: Mesh) -> JointAction:
-        joint, size = mesh.joint, sp.Symbol(f"gear.{mesh.joint.name}.tangential", real=True)
+        joint = mesh.joint
         first, second = (self.point(joint, body) for body in joint.bodies)
-        along = ((size, mesh.direction),)
+        along = ((mesh.size, mesh.direction),)
         return JointAction(joint=joint, along=along, moment=None, points=(first, second), shifts=mesh.shifts)
 
     @property

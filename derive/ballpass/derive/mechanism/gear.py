@@ -39,6 +39,7 @@ from ballpass.derive.mechanism.kinematics import (
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import FRAME, Gear, Joint, Mechanism
 from ballpass.derive.terms import symbol_of
+from ballpass.derive.variables import Words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +66,18 @@ class GearPair(Group):
     def joints(self) -> tuple[str, ...]:
         """Name of the joint that holds the wheel."""
         return (self.hinges[0].name,)
+
+    @property
+    def outputs(self) -> Sequence[Words]:
+        """The force between the teeth, or that of the strand."""
+        name, words = f"gear.{self.gear.name}.force", f"Force of gear {self.gear.name} along its line of action"
+        return ((name, sp.Symbol(name, real=True), "N", words),)
+
+    @property
+    def circles(self) -> tuple[str, str, str, str, float] | None:
+        """Pitch circles; pulleys of a belt have none."""
+        (one, other), (axis, far) = self.mesh.bodies, self.mesh.points
+        return (one, axis, other, far, float(self.lever)) if self.gear.radius is None else None
 
     @property
     def sense(self) -> int:
@@ -177,7 +190,9 @@ class GearPair(Group):
             sine = side * sp.sqrt(1 - cosine**2)
             direction = add(scale(cosine, across), scale(sine, along))
             normal = subtract(scale(cosine, along), scale(sine, across))
-        return Mesh(joint=self.mesh, direction=direction, shifts=(scale(first, normal), scale(second, normal)))
+        size = sp.Symbol(f"gear.{self.gear.name}.tangential", real=True)
+        shifts = scale(first, normal), scale(second, normal)
+        return Mesh(joint=self.mesh, size=size, direction=direction, shifts=shifts)
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
         """Teeth: moment of the wheel about its axis; then the hinge."""

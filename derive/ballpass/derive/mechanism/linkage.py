@@ -17,9 +17,9 @@ import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.assembly import assemble
+from ballpass.derive.mechanism.balance import Mesh
 from ballpass.derive.mechanism.dyads import Group, Margin, Placement
 from ballpass.derive.mechanism.evaluator import Evaluator
-from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
@@ -98,7 +98,12 @@ class Linkage:
     @property
     def contacts(self) -> tuple[Joint, ...]:
         """Joints, and gears as joints."""
-        return (*self.mechanism.joints, *(d.mesh for d in self.dyads if isinstance(d, GearPair)))
+        return (*self.mechanism.joints, *(mesh.joint for mesh in self.meshes))
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """Contacts that are no joints of the mechanism."""
+        return tuple(mesh for p in self.placements if (mesh := p.dyad.meshing(p)) is not None)
 
     @property
     def turns(self) -> int:

@@ -17,7 +17,6 @@ from types import MappingProxyType
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance, Guide
-from ballpass.derive.mechanism.gear import GearPair
 from ballpass.derive.mechanism.kinematics import Ledger, Pair, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.errors import Fault, LinkageError
@@ -69,8 +68,7 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     guides = {guide.joint.name: guide for p in linkage.placements for guide in p.guides}
     _refuse(linkage, guides, moments)
     driver, driven = linkage.driver, linkage.driven
-    meshes = [p.dyad.meshing(p) for p in linkage.placements if isinstance(p.dyad, GearPair)]
-    balance = Balance(mechanism, linkage.poses, driver, guides, meshes, loads, moments)
+    balance = Balance(mechanism, linkage.poses, driver, guides, linkage.meshes, loads, moments)
     matrix, right_side, rows = balance.equations(driven)
     ledger = Ledger()
     for placement in reversed(linkage.placements):

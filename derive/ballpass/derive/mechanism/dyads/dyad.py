@@ -17,7 +17,7 @@ from typing import ClassVar, Literal, Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Balance, Guide
+from ballpass.derive.mechanism.balance import Balance, Guide, Mesh
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
@@ -39,6 +39,7 @@ from ballpass.derive.mechanism.kinematics import (
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import Joint, Mechanism
 from ballpass.derive.terms import symbol_of
+from ballpass.derive.variables import Words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +67,20 @@ class Group(ABC):
     @abstractmethod
     def joints(self) -> tuple[str, ...]:
         """Names of the joints that the bodies are placed by."""
+
+    @property
+    def outputs(self) -> Sequence[Words]:
+        """Of what `solve` defines besides reactions."""
+        return ()
+
+    @property
+    def circles(self) -> tuple[str, str, str, str, float] | None:
+        """Bodies and points on the axes of two wheels in mesh, and the first one's share of their distance."""
+        return None
+
+    def meshing(self, placement: Placement) -> Mesh | None:
+        """A contact of the bodies that is no joint of the mechanism."""
+        return None
 
     @abstractmethod
     def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
