@@ -23,7 +23,6 @@ from ballpass.derive.variables import Words
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.derive.scene.checker import Checker
     from ballpass.derive.scene.designations import BearingType
 
 #: Approach of a steel roller and a raceway over Q^0.9/l^0.8, in m, N, m; and the compliance of that steel [1/Pa].
@@ -92,9 +91,6 @@ class CylindricalRoller(RollingElement):
 
     def fill_contact(self, ball_diameter: object, kind: BearingType) -> Mapping[str, object]:
         return {"length": f"{kind.length} mm"}
-
-    def check(self, checker: Checker, bearing: Bearing) -> None:
-        """Nothing: every length fits every diameter."""
 
     def ring_stiffnesses(self, bearing: Bearing, names: Names) -> tuple[list[Definition], list[sp.Symbol]]:
         contact = bearing.contact

@@ -7,7 +7,6 @@ and channels "ball" stands for any element.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from types import MappingProxyType
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 RINGS: Fill = MappingProxyType({"PART": "rings", "_OF": ""})
 
 
-class RollingElement(ABC):
+class RollingElement:
     """A rolling element between two rings.
 
     Attributes
@@ -90,7 +89,6 @@ class RollingElement(ABC):
         """Keys of the contact that a designation gives, besides steel."""
         return {}
 
-    @abstractmethod
     def check(self, checker: Checker, bearing: Bearing) -> None:
         """Note what numbers of the contact do not fit together."""
 
@@ -117,11 +115,10 @@ class RollingElement(ABC):
         """Stiffness factor of contacts whose deflections add up."""
         return sum(factor ** (-1 / self.exponent) for factor in factors) ** -self.exponent
 
-    @abstractmethod
     def ring_stiffnesses(self, bearing: Bearing, names: Names) -> tuple[list[Definition], list[sp.Symbol]]:
-        """Stiffness factors of the contacts with inner and outer ring, and the way to them."""
+        """Stiffness factors of the contacts with inner and outer ring, and the way to them, of one from geometry."""
+        return [], []
 
-    @abstractmethod
     def contact_quantities(
         self, bearing: Bearing, names: Names, force: sp.Expr
     ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[Words]]]:
@@ -129,6 +126,7 @@ class RollingElement(ABC):
 
         The constants use those of `stiffness`.
         """
+        return {}
 
     def approach(self, ring: str, names: Names, force: sp.Expr) -> Words:
         """Approach of the element and a ring whose stiffness factor `ring_stiffnesses` defines."""

@@ -6,7 +6,6 @@ exponent: ``k N/mm^n`` is the force ``k N`` at 1 mm.  Nothing is said of shape a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -19,11 +18,9 @@ from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
-from ballpass.derive.variables import Words
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.derive.scene.checker import Checker
 
 _WHEN = 'required with `element = "power-law"`'
 
@@ -79,9 +76,6 @@ class PowerLaw(RollingElement):
         with table.table("contact", self.contact_words) as contact:
             return read_record(PowerLawContact, contact)
 
-    def check(self, checker: Checker, bearing: Bearing) -> None:
-        """Nothing: every force fits every deflection."""
-
     def stiffness(self, bearing: Bearing, names: Names) -> list[Definition]:
         """k_b, that of the chord from no load to the reference deflection."""
         contact, words = bearing.contact, f"Stiffness of a {self.noun}, force over deflection of the reference"
@@ -91,12 +85,3 @@ class PowerLaw(RollingElement):
     def power_law(self, bearing: Bearing, names: Names) -> tuple[sp.Expr, sp.Expr]:
         exponent = symbol_of(bearing.contact.exponent)
         return names.constant("k_b") * symbol_of(bearing.contact.deflection) ** (1 - exponent), exponent
-
-    def ring_stiffnesses(self, bearing: Bearing, names: Names) -> tuple[list[Definition], list[sp.Symbol]]:
-        """None: the law is of both contacts together."""
-        return [], []
-
-    def contact_quantities(
-        self, bearing: Bearing, names: Names, force: sp.Expr
-    ) -> Mapping[str, tuple[tuple[Definition, ...], Sequence[Words]]]:
-        return {}
