@@ -30,6 +30,9 @@ WHAT = {
     "v_compressor": ("RRP, RRP", "crank at 1 rad"),
     "watt_six_bar": ("RRR, RRR", "crank at 0.9 rad"),
     "stephenson_six_bar": ("RRR, RRR", "crank at 0.9 rad"),
+    "scotch_yoke": ("RPP", "crank at 45 deg"),
+    "elliptic_trammel": ("RRP", "crank at 0.7 rad"),
+    "geared_five_bar": ("gear, RRR", "pinion at 0.9 rad"),
 }
 
 

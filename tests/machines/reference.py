@@ -7,7 +7,7 @@ an angle, elastic outer rings of bearings coupled two-way x and y; joints and a 
 accelerations and reactions come from one linear system.  Balls are forces between points.
 
 Not covered (`missing` says so): fits, lubrication and other settings of ratings, designations, columns of files,
-jitter, roughness, rollers without a given stiffness.
+jitter, roughness, rollers without a given stiffness.  Of gears external ones on the frame are.
 """
 
 from __future__ import annotations
@@ -284,6 +284,8 @@ class Reference:
         if self.two_way:
             elastic = [one.name for one in self.bearings if one.elastic]
             self.rings = {name: 3 * len(self.bodies) + 2 * k for k, name in enumerate(elastic)}
+        self.gears = self.mechanism.get("gears", {})
+        assert all(gear.get("type", "external") == "external" for gear in self.gears.values())  # on the frame
         self.size = 3 * len(self.bodies) + 2 * len(self.rings)
         self.driver = self.mechanism["driver"]
         self.driven = next(b for b in self.joints[self.driver["joint"]]["bodies"] if b != "frame")
@@ -378,7 +380,32 @@ class Reference:
             rows += [normal @ jacobian + (sideways @ apart) * self.row(first), self.row(second) - self.row(first)]
             rest.append(-normal @ left - 2 * turning * sideways @ (jacobian @ v) + turning**2 * normal @ apart)
             rest.append(0.0)
+        for name, gear in self.gears.items():  # the wheels' angles; where their teeth push, see `_teeth`
+            (one, two), ratio = gear["bodies"], -gear["teeth"][0] / gear["teeth"][1]
+            begins = (number(gear.get(f"{which}_angle", 0.0)) for which in ("first", "second"))
+            turned = [self.angle(body, q) - begin for body, begin in zip((one, two), begins, strict=True)]
+            where[name] = len(rows)
+            residuals.append(turned[1] - ratio * turned[0])
+            rows.append(self.row(two) - ratio * self.row(one))
+            rest.append(0.0)
         return np.array(residuals), np.array(rows), np.array(rest), where
+
+    def _teeth(self, name: str, torque: float) -> tuple[Array, float, dict[str, str]]:
+        """Force of the second wheel on the first, its size along the line of pressure, and the wheels' hinges.
+
+        The multiplier is the torque of the teeth on the second wheel.
+        """
+        gear = self.gears[name]
+        hinges, axes = {}, []
+        for body in gear["bodies"]:
+            hinge, joint = next((n, j) for n, j in self.joints.items() if {*j["bodies"]} == {"frame", body})
+            hinges[hinge] = body
+            axes.append(self.arm("frame", joint.get("points", (hinge, hinge))[joint["bodies"].index("frame")]))
+        along, teeth = axes[1] - axes[0], gear["teeth"]
+        size = torque / (np.linalg.norm(along) * teeth[1] / sum(teeth))
+        along, slope = along / np.linalg.norm(along), math.tan(number(gear.get("pressure_angle", "0.3490658503988659")))
+        force = size * (QUARTER @ along) - abs(size) * slope * along
+        return force, abs(size) * math.hypot(1.0, slope), hinges
 
     def _play(self, q: Array, v: Array) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:
         """Distances that coordinates of bearings measure, by their names."""
@@ -451,7 +478,8 @@ class Reference:
         return size - free - TURN * round((mean - free) / TURN)
 
     def _on_branches(self, q: Array) -> bool:
-        placed, still = {"frame", self.driven}, np.zeros(self.size)
+        wheels = {body for gear in self.gears.values() for body in gear["bodies"]}
+        placed, still = {"frame", self.driven, *wheels}, np.zeros(self.size)
         while True:
             for name, joint in self.joints.items():  # noqa: B007 - used after the loop
                 pair = joint["bodies"]
@@ -760,6 +788,13 @@ class Reference:
                 reaction = -forces[where[name]] * (QUARTER @ self.guide(name, q))
                 out[f"reaction.{name}.moment"] = -float(forces[where[name] + 1])
             out |= self._named(f"reaction.{name}", reaction)
+        for name in self.gears:
+            force, out[f"gear.{name}.force"], hinges = self._teeth(name, float(forces[where[name]]))
+            out |= self._named(f"reaction.{name}", force)
+            for sign, (hinge, body) in zip((1.0, -1.0), hinges.items(), strict=True):
+                on_frame = sign if self.joints[hinge]["bodies"][1] == body else -sign
+                held = [out[f"reaction.{hinge}.{axis}"] for axis in "xy"]
+                out |= self._named(f"reaction.{hinge}", np.array(held) + on_frame * force)
         for name, (_, jacobian, left) in self._play(q, v):
             out |= self._named(f"a.{name}", jacobian @ accelerations + left)
         if motor:
