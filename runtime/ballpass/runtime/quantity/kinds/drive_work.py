@@ -50,9 +50,9 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
     window = whole_cycles(span, cycle)
     if window is None:
         raise RequestError(
-            f"{quantity.name}: the time that counts holds no whole turn of the driver, or as many as all loads repeat "
-            "after, from a whole turn on; where its speed changes, it must hold whole turns alone. Run longer, or ask "
-            "for whole turns (cycles, transient)."
+            f"{quantity.name}: the time that counts holds no whole turn of the driver, or fewer than all loads repeat "
+            "after. It begins with a whole turn, and where the speed changes it ends with one. Ask for whole turns "
+            "(cycles, transient), or of a driver that makes none for mean:drive_torque."
         )
     if not span.turning.is_even:
         return _of_changing_speed(view, quantity)
