@@ -196,3 +196,55 @@ def test_a_sector_that_comes_round_is_refused(model_of: Callable[..., Model]) ->
 def test_what_is_no_gear_pair_is_refused(text: str, words: str) -> None:
     with pytest.raises(SceneError, match=words):
         Derived(scene_from_text(text + RUN, "wheels"))
+
+
+WHEEL = """
+[bearing]
+joint = "E"
+share = 0.5
+designation = "6204"
+clearance = "5 um"
+[bearing.damping]
+law = "tangent"
+ratio = "2.5e-5 s"
+[bearing.inner_ring]
+mass = "2 kg"
+damping = "300 N*s/m"
+[bearing.outer_ring]
+support = "fixed"
+"""
+STEADY = '[run]\ncycles = 2\ntransient_cycles = 0\nrtol = 1e-11\nsamples_per_cycle = 100\noutputs = ["inner.*"]\n'
+
+
+def test_a_bearing_loaded_one_way_turns_with_its_wheel(model_of: Callable[..., Model]) -> None:
+    """At the axis of a wheel under a constant torque it is one on a shaft of the wheel's speed, under its reaction."""
+    machine = linkage_text(two_wheels(30.0))
+    geared = model_of(machine + WHEEL + STEADY.replace('"inner.*"', '"inner.*", "reaction.E.*"'))
+    run = geared.simulate()
+    force = [float(run[f"reaction.E.{axis}"][0]) for axis in "xy"]
+    assert np.hypot(*force) == pytest.approx(30.0 / 0.05 / math.cos(math.radians(20)), rel=1e-12)
+    load = f'[load]\ntype = "constant"\nforce = ["{force[0]!r} N", "{force[1]!r} N"]\n'
+    shaft = f'[shaft]\nspeed = "{-10.0 * 20 / 50!r} rad/s"\n{load}'
+    alone = model_of(shaft + WHEEL.replace('joint = "E"\n', "") + STEADY)
+    other = alone.simulate(duration=float(run.t[-1]), sample_rate=(len(run.t) - 1) / float(run.t[-1]))
+    np.testing.assert_allclose(run.x, other.x, rtol=0.0, atol=1e-8 * np.max(np.abs(other.x)))
+    numbers, names = geared.numbers().values, ("ring_speed", "cage_speed")
+    assert [numbers[f"bearing.{name}"] for name in names] == pytest.approx(
+        [-4.0, alone.numbers().values["bearing.cage_speed"]], rel=1e-12
+    )
+    life = geared.life(cycles=2, transient=0).bearings[0], alone.life(cycles=0.8, transient=0).bearings[0]
+    assert life[0].speed == pytest.approx(life[1].speed, rel=1e-9)
+    assert life[0].life == pytest.approx(life[1].life, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("machine", "at", "words"),
+    [
+        (two_wheels(30.0), 'joint = "E"\nposition = "10 mm"', "those of the driven body"),
+        (geared_five_bar(), 'joint = "B"\nshare = 0.5', "or hold a wheel of a gear to the frame"),
+    ],
+)
+def test_a_bearing_loaded_one_way_is_refused_elsewhere(machine: Machine, at: str, words: str) -> None:
+    text = linkage_text(machine) + WHEEL.replace('joint = "E"\nshare = 0.5', at) + STEADY
+    with pytest.raises(SceneError, match=words):
+        scene_from_text(text, "elsewhere")

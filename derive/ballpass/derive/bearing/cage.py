@@ -206,7 +206,7 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
             names.latex(r"\kappa_c(t)"),
         )
         constants += slip.constants
-    if bearing.coupling == "two-way" or outer.turns not in (0, 1):  # else it is that of driver or shaft
+    if bearing.coupling == "two-way" or {inner.turns, outer.turns} - {0, 1}:  # else it is that of driver or shaft
         words = "Mean speed of the inner ring relative to the outer one"
         ring_speed = names.constant("ring_speed")
         constants.append(names.define(ring_speed, around * drive.first_speed, "rad/s", words, r"\omega_{io}"))

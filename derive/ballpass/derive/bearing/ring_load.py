@@ -39,7 +39,8 @@ def load_on(
 ) -> Pair | None:
     """Force on an inner ring that is loaded one-way: its share of the reaction of its joint, and loads of the scene.
 
-    On a shaft it has a share of these; the reaction is that of the body it carries on the frame.
+    On a shaft it has a share of these; the reaction is that of the body it carries on the frame.  Beside a
+    mechanism loads of the scene are on the driven body.
 
     Parameters
     ----------
@@ -50,10 +51,11 @@ def load_on(
     share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
     if linkage is None or reactions is None:
         return scale(share, own.force) if lever is None else lever.bears(own.force, own.moment)
-    joint = linkage.driver  # the reader refuses another one
-    reaction = reactions.joint_force[joint.name]
+    reaction = scale(share, reactions.joint_force[bearing.joint or ""])  # on the frame, the first body
+    if bearing.joint != linkage.driver.name:
+        return reaction
     if lever is None:
-        return add(scale(share, reaction), own.force)
+        return add(reaction, own.force)
     on_shaft = load_on_shaft(own, linkage, reactions)
     return lever.bears(on_shaft.force, on_shaft.moment)
 

@@ -71,9 +71,9 @@ def play_of(bearing: Bearing, joint: Joint, inner: Motion) -> Motion:
 
 
 def carriers_of(bearing: Bearing, linkage: Linkage) -> tuple[str, str]:
-    """The bodies that carry inner and outer ring: one-way the driven body and the frame."""
+    """The bodies that carry inner and outer ring: one-way the moving body and the frame."""
     if bearing.coupling == "one-way":
-        return linkage.driven, FRAME
+        return linkage.mechanism.joint(bearing.joint or "").bodies[1], FRAME
     return bearing.inner_body, linkage.mechanism.joint(bearing.joint or "").other(bearing.inner_body)
 
 

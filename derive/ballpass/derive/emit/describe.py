@@ -108,7 +108,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
 def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     scene = system.scene
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
-    driven = system.linkage.driven if system.linkage is not None else ""
+    constants = {d.symbol.name for d in system.constants}
     laws = [dict(bearing.laws).get("damping") for bearing in system.bearings]
     return tuple(
         mf.BearingInfo(
@@ -117,9 +117,11 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             path=bearing.path,
             balls=bearing.balls,
             joint=bearing.joint or "",
-            inner_body=bearing.inner_body or driven if bearing.joint is not None else "",
+            inner_body=""
+            if system.linkage is None
+            else bearing.inner_body or system.linkage.mechanism.joint(bearing.joint or "").bodies[1],
             ring_speed=f"{bearing.path}.ring_speed"
-            if bearing.coupling == "two-way" or (scene.shaft is not None and scene.shaft.outer_speed is not None)
+            if f"{bearing.path}.ring_speed" in constants
             else speed.path
             if speed is not None
             else "",

@@ -114,7 +114,7 @@ class GearPair(Group):
                 f"{gear.name}, whose wheels are rigid",
                 given=f'coupling = "two-way" at {", ".join(loose)}',
                 allowed="bearings coupled two-way at joints that hold no axis of a gear",
-                remedy='give the bearing coupling = "one-way", or take it away',
+                remedy='give the bearing coupling = "one-way", or put it at another joint',
             ).of_linkage()
         side = gear.bodies.index(wheel)
         ratio = self.sense * sp.Rational(*gear.teeth)

@@ -180,19 +180,29 @@ def _read_place(
             f"{given}, a {joint.kind} joint",
             listing([j.name for j in mechanism.joints if j.kind == "revolute"]),
         )
-    elif coupling == "one-way" and driven is not None and (joint.kind != "revolute" or joint.bodies != (FRAME, driven)):
+    elif (
+        coupling == "one-way" and driven is not None and joint.name not in (hinges := _driven_hinges(mechanism, driven))
+    ):
         problem = (
-            "a bearing that is loaded one-way must sit at the driver's joint: its inner ring turns with the driver"
+            "a bearing that is loaded one-way must sit at the driver's joint, or hold a wheel of a gear to the frame: "
+            "its inner ring turns with the driver"
         )
         given = f"{given}, a {joint.kind} joint with bodies {listing(joint.bodies)}"
-        allowed, remedy = (
-            show(mechanism.driver.joint),
-            f'write joint = "{mechanism.driver.joint}", or coupling = "two-way"',
-        )
+        allowed, remedy = listing(hinges), f'write joint = "{mechanism.driver.joint}", or coupling = "two-way"'
+    elif coupling == "one-way" and joint.name != mechanism.driver.joint and (tilts or position is not None):
+        problem, remedy = "places along the shaft, and its tilts, are those of the driven body", "write share = 1"
+        allowed = f"{show(mechanism.driver.joint)}; elsewhere a share, where the driven body does not tilt"
     else:
         return place
     table.fault("joint", problem, given=given, allowed=allowed, remedy=remedy)
     return place
+
+
+def _driven_hinges(mechanism: Mechanism, driven: str) -> list[str]:
+    """Hinges on the frame of bodies that the driver turns, or a gear."""
+    turned = {driven, *(wheel for gear in mechanism.gears for wheel in gear.bodies)}
+    hinges = (joint for joint in mechanism.joints if joint.kind == "revolute" and joint.bodies[:1] == (FRAME,))
+    return [joint.name for joint in hinges if joint.bodies[1] in turned]
 
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:

@@ -424,7 +424,7 @@ class Bearing:
                 remedy="delete the key, or describe the mechanism",
             ),
         ),
-        note="one-way: the driver's joint; two-way: any revolute joint",
+        note="one-way: the driver's joint, or that of a wheel of a gear on the frame; two-way: any revolute joint",
     ).declared()
     share: SceneNumber | None = quantity(
         "1",
