@@ -82,6 +82,20 @@ def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[...
     assert report.quantities[0].value == pytest.approx(float(single["life"][1]), rel=1e-4)
 
 
+def test_the_static_safety_is_that_of_the_life_and_follows_sizes_and_load(make_model: Callable[..., Model]) -> None:
+    """s_0 = 5 C_0/(Z Q) of the peak Q."""
+    model = make_model("punching_press")
+    run = {"cycles": 3, "transient": 1, "rtol": 1e-9}
+    found = model.quantities(["s_0", "peak_ball_force"], kinks="located", **run)  # type: ignore[arg-type]
+    report = model.life(**run).bearings[0]  # type: ignore[arg-type]
+    assert found["s_0"].value == pytest.approx(report.static_safety, rel=1e-6)
+    static = 5.0 * report.static_rating / 8 / found["peak_ball_force"].value
+    assert found["s_0"].value == pytest.approx(static, rel=1e-12)
+    by = model.sensitivity("s_0", ["bearing.ball_diameter", "bearing.clearance"], cycles=3, transient=1)
+    assert by.verdicts[Verdict.VERIFIED] == 2
+    assert by["s_0", "bearing.ball_diameter"].dimensionless > 2.0  # of C_0 alone
+
+
 @pytest.mark.long
 @pytest.mark.extreme
 def test_the_bearing_of_several_is_named(make_model: Callable[..., Model]) -> None:

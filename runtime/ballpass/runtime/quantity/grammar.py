@@ -190,8 +190,9 @@ def _written(manifest: Manifest, channels: Mapping[str, tuple[int, str]], kind: 
     else:
         for bearing in manifest.bearings:
             if kind.takes == "bearing":
-                yield f"{bearing.prefix}{kind.name}", f"{bearing.prefix}ball.force"
-                yield f"{kind.name}:{bearing.prefix}ball.force", f"{bearing.prefix}ball.force"
+                for name in (kind.name, *kind.also):
+                    yield f"{bearing.prefix}{name}", f"{bearing.prefix}ball.force"
+                    yield f"{name}:{bearing.prefix}ball.force", f"{bearing.prefix}ball.force"
             else:
                 # ``static_left_deflection`` of one bearing of several
                 yield kind.name.replace("_", f"_{bearing.name}_", 1) if bearing.name else kind.name, bearing.prefix

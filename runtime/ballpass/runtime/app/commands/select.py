@@ -120,7 +120,7 @@ class Selection(Reported):
             ">s_0": lambda one: cell(one.static_safety),
             ">peak force [N]": lambda one: cell(one.peak_force),
         }
-        for name in dict.fromkeys(name for one in self.candidates for name in one.of):
+        for name in dict.fromkeys(name for one in self.candidates for name in one.of if f">{name}" not in columns):
             columns[f">{name}"] = lambda one, name=name: rounded(one.of[name]) if name in one.of else ""  # type: ignore[misc]
         columns["~lacks"] = lambda one: one.lacks
         first = min(self.chosen, key=_room, default=None)

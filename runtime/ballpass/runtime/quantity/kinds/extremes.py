@@ -29,7 +29,8 @@ AT_JUMP = 1e-5
 ALIKE, FLOOR = 0.1, 1e-3
 
 
-def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
+def extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
+    """The largest or smallest value: "max" or "min"."""
     mark = view.marks[quantity.name, kind]
     signal = view.signals[quantity.channel]
     slope = signal.slope[mark.node, mark.ball]
@@ -92,7 +93,7 @@ def _peak_ball(view: View, quantity: Quantity) -> Estimate:
 
 
 def _range(view: View, quantity: Quantity) -> Estimate:
-    top, bottom = _extreme(view, quantity, "max"), _extreme(view, quantity, "min")
+    top, bottom = extreme(view, quantity, "max"), extreme(view, quantity, "min")
     parts = (("largest", top.kink), ("smallest", bottom.kink))
     return Estimate(
         value=top.value - bottom.value,
@@ -153,7 +154,7 @@ def _value_kind(name: str, size: str, words: str, also: tuple[str, ...] = ()) ->
         also=also,
         summary=f"{size} value",
         words=words,
-        evaluate=lambda view, quantity: _extreme(view, quantity, name),
+        evaluate=lambda view, quantity: extreme(view, quantity, name),
         extremes=(name,),
         reduced=lambda runs, quantity: runs.entry(name, quantity.channel),
         rows=(name,),
