@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ballpass.runtime.native.compilers import find_compiler
-from benchmarks import coupling, ensembles, first_use, page, preparation, sensitivities, work_precision
+from benchmarks import coupling, ensembles, first_use, page, preparation, questions, sensitivities, work_precision
 from benchmarks.problem import CASES, ROOT
 
 PACKAGES = ("casadi", "numpy", "scipy", "sympy", "numba", "numbalsoda", "scikit-sundae", "jax", "diffrax", "exudyn")
@@ -31,6 +31,7 @@ def parts(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
         "sensitivities": lambda: sensitivities.measure(1 if quick else 9, quick),
         "preparation": lambda: preparation.measure(1 if quick else 5),
         "first_use": lambda: first_use.measure(1 if quick else 3),
+        "questions": lambda: questions.measure(1, 4) if quick else questions.measure(5),
     }
 
 

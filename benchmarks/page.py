@@ -41,6 +41,7 @@ def write(parts: Mapping[str, Result], page: Path) -> None:
         "sensitivities": _sensitivities,
         "preparation": _preparation,
         "first_use": _first_use,
+        "questions": _questions,
     }
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
     summary = _summary(parts["work_precision"]["result"]) if "work_precision" in parts else []
@@ -271,4 +272,25 @@ def _first_use(result: Result, _: Path) -> list[str]:
         "sensitivity over those of one bearing. Alike bearings have elastic outer rings and share the press load.",
         "",
         *table(head, [row(words, own) for words, own in result.items()]),
+    ]
+
+
+def _questions(result: Result, _: Path) -> list[str]:
+    rows = [[words, *(f"{part:.3g}" for part in ratio)] for words, ratio in result["ratios"].items()]
+    returns = [[words, rounded(count)] for words, count in result["returns"].items() if math.isfinite(count)]
+    points = result["points"]
+    return [
+        "## What questions cost over the runs they are made of",
+        "",
+        "Processor time over processor time, medians with the 10th and the 90th percentile. Gradients and an optimum's "
+        "slopes are of runs at a hundredth of the tolerance of the values, whose steps end on every kink; values and "
+        "sweeps go over the kinks, in lanes.",
+        "",
+        *table(["", "ratio", "10 %", "90 %"], rows),
+        "",
+        f"A map of the rotor of varying compliance over clearance and speed, {points} by {points} points at a relative "
+        f"tolerance of {level_words(result['rtol'])}: returns (from one passing of balls to the next) a second of one "
+        "core. DOP853 is compiled, its right-hand side by numba.",
+        "",
+        *table(["", "returns a second"], returns),
     ]
