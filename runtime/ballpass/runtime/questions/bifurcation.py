@@ -35,12 +35,17 @@ if TYPE_CHECKING:
     from ballpass.runtime.motion.lyapunov import Exponent
     from ballpass.runtime.motion.motion_map import MotionMap
     from ballpass.runtime.motion.strobe import Strobe
+    from ballpass.runtime.request.start import RunEnd
+    from ballpass.runtime.solution.solution import Solution
 
 #: Both directions agree where their readings' means do, in shares of the magnitudes [1].
 SAME = 1e-2
 
 #: Longest delay of an interrupt [s].
 PATIENCE = 0.2
+
+#: Periods of a motion that repeats whose multipliers are taken.
+PERIODS = 3
 
 Vary = Annotated[
     str | Sequence[str],
@@ -418,29 +423,34 @@ def _motion(
     exponent: bool,
     each: Callable[[], None],
 ) -> Arrays:
-    """The motion from a state on: readings, their derivatives by those before, if any, and magnitudes."""
-    from ballpass.runtime.motion.lyapunov import strobe_with_tangents
+    """The motion from a state on: readings, derivatives of readings by those before, if any, and magnitudes."""
+    from ballpass.runtime.motion.lyapunov import period_of, strobe_with_tangents
     from ballpass.runtime.request.start import state_at
     from ballpass.runtime.time.repetition import Repetition
 
-    count = max(settling, 1) if exponent else settling + readings
     numbers = model.numbers(parameters)
     begin = Repetition.of(model.manifest, numbers.values).alike_from
-    run = model.simulate(
-        duration=count * step if start is not None else begin + count * step,
-        times=begin + step * np.arange(1, count + 1),
-        parameters=parameters,
-        initial=None if start is None else state_at(model, numbers, begin, start),
-        rtol=SECTION_RTOL if rtol is None else rtol,
-        outputs=[],
-        transient=0.0,
-        progress=lambda _done: each(),
-    )
+
+    def read(count: int, initial: RunEnd | None, first: float, default: float) -> Solution:
+        return model.simulate(
+            duration=count * step if initial is not None else first + count * step,
+            times=first + step * np.arange(1, count + 1),
+            parameters=parameters,
+            initial=initial,
+            rtol=default if rtol is None else rtol,
+            outputs=[],
+            transient=0.0,
+            progress=lambda _done: each(),
+        )
+
+    count = max(settling, 1) if exponent else settling + readings
+    run = read(count, None if start is None else state_at(model, numbers, begin, start), begin, SECTION_RTOL)
     magnitude = np.array(run.statistics.magnitudes)
     if not exponent:
         return run.x[settling:], np.zeros(0), magnitude
     tight = EXPONENT_RTOL if rtol is None else rtol
-    return (
-        *strobe_with_tangents(model, numbers, run.end, step, readings, magnitude, tight, each),
-        magnitude,
-    )
+    after = read(readings, run.end, begin + count * step, tight)
+    few = PERIODS * period_of(after.x, magnitude)
+    begin_again, count = (after.end, few) if 0 < few < readings else (run.end, readings)
+    states, flows = strobe_with_tangents(model, numbers, begin_again, step, count, magnitude, tight, each)
+    return after.x if count == few else states, flows, magnitude
