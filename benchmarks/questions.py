@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from ballpass.derive import generate, read_scene
 from ballpass.runtime import QuantityFunction, load
+from ballpass.runtime.motion.motion_map import MotionMap
 from benchmarks.contenders import UnavailableError
 from benchmarks.peers import imported
 from benchmarks.problem import CASES, ROOT
@@ -21,7 +22,7 @@ from benchmarks.timing import interleave, spread
 #: Rows of a batch of gradients, and values of a sweep, which an optimum begins with.
 ROWS, SWEPT = 64, 33
 FORCE, CLEARANCE = "peak_ball_force", "bearing.clearance"
-#: The rotor of varying compliance: bounds of clearance and speed, values of each, readings that do not count and that do.
+#: The rotor of varying compliance: bounds of clearance and speed, values of each; readings that do not count, that do.
 SPEEDS, CLEARANCES, POINTS = (80.0, 160.0), (0.0, 20e-6), 16
 SETTLING, READINGS = 40, 60
 #: Tolerance of the readings, of both.
@@ -58,13 +59,13 @@ def measure(rounds: int, points: int = POINTS) -> dict[str, Any]:
             f"{CLEARANCE}={CLEARANCES[0]} m:{CLEARANCES[1]} m:{points}",
             f"shaft.speed={SPEEDS[0]} rad/s:{SPEEDS[1]} rad/s:{points}",
         ]
-        found = {
-            words: rotor.bifurcation(
+        returns = {}
+        for words, exponents in (("states alone", False), ("with exponents", True)):
+            found = rotor.bifurcation(
                 ranges, readings=READINGS, settling=SETTLING, exponent=exponents, rtol=RTOL, progress=False
-            ).motions.returns
-            for words, exponents in (("states alone", False), ("with exponents", True))
-        }
-        returns = {words: count / seconds for words, (count, seconds) in found.items()}
+            )
+            assert isinstance(found, MotionMap)
+            returns[words] = float(found.motions.returns[0] / found.motions.returns[1])
         try:
             returns["numbalsoda DOP853"] = _peer(rotor.parameters, points)
         except UnavailableError as fault:
@@ -72,7 +73,7 @@ def measure(rounds: int, points: int = POINTS) -> dict[str, Any]:
     return {"ratios": ratios, "points": points, "rtol": RTOL, "returns": returns}
 
 
-def _peer(numbers: dict[str, float], points: int) -> float:
+def _peer(numbers: Mapping[str, float], points: int) -> float:
     """Returns of the rotor per second, states at a passing of balls after the other."""
     numba, numbalsoda = imported("numba"), imported("numbalsoda")
 

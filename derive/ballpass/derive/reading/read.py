@@ -283,18 +283,19 @@ def _read(root: Table, name: str) -> Scene:
             _refuse_unbalance(root, loads)
         tilts = _tilts(root, shaft, mechanism, driven)
         bearings = _read_bearings(root, mechanism, driven, tilts) if has_bearing else ()
-        _check_positions(root, bearings, tilts)
-        known = driven is not None  # else a fault of the driver is noted
-        if not any(bearing.position for bearing in bearings):
-            driven = None
-            _refuse_places(root, [load.path for load in loads if load.position is not None])
-        if mechanism is not None:
-            named = [body.name for body in mechanism.bodies if known and body.positions and body.name != driven]
-            _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
-            pivots = {j.point(driven or "") for j in mechanism.joints if j.bodies == (FRAME, driven)}
-            own = [name for body in mechanism.bodies if body.name == driven for name, _ in body.positions]
-            _refuse_places(root, [f"mechanism.bodies.{driven}.positions.{name}" for name in own if name in pivots])
-            _check_loads_beside(root, loads, bearings)
+        if bearings or not has_bearing:  # else reported
+            _check_positions(root, bearings, tilts)
+            known = driven is not None  # else a fault of the driver is noted
+            if not any(bearing.position for bearing in bearings):
+                driven = None
+                _refuse_places(root, [load.path for load in loads if load.position is not None])
+            if mechanism is not None:
+                named = [body.name for body in mechanism.bodies if known and body.positions and body.name != driven]
+                _refuse_places(root, [f"mechanism.bodies.{name}.positions" for name in named])
+                pivots = {j.point(driven or "") for j in mechanism.joints if j.bodies == (FRAME, driven)}
+                own = [name for body in mechanism.bodies if body.name == driven for name, _ in body.positions]
+                _refuse_places(root, [f"mechanism.bodies.{driven}.positions.{name}" for name in own if name in pivots])
+                _check_loads_beside(root, loads, bearings)
         cycle = _turns_of_loads(mechanism, shaft, loads, None if root.collector.faults else mechanism)
         speeds = mechanism.driver.table if mechanism is not None else None
         # rows of equal speed are those of a constant one
