@@ -73,7 +73,7 @@ NAMED: dict[str, dict[str, str]] = {
         "cage ratio of 3/8": "31.75 mm in the block: (1 - 7.9375/31.75)/2",
         "a 95 % interval by means of ten batches": "`BATCHES` and `CONFIDENCE` of motion/lyapunov.py",
         "repeats after n readings, up to 200": "`LONGEST` of motion/lyapunov.py",
-        "at 10 µm with 3/8 −9.893456 ± 3e-7": "ADR 0032; test_bifurcation.py",
+        "at 10 µm with 3/8 −9.893456 ± 2e-6": "ADR 0032; test_bifurcation.py",
         "exact over 134 readings, and 268 give": "test_bifurcation.py",
         "at 40 µm 38 readings read 4.0 to 4.4": "ADR 0032",
         "larger denominator than 200": "`LONGEST` of motion/lyapunov.py",
