@@ -1,4 +1,4 @@
-"""The tables of keys in docs/reference/scene.md, from the declarations of the keys.
+"""The tables of keys in the pages of docs/reference/scene/, from the declarations of the keys.
 
 A table stands between two comments, of which the first names the tables of the scene file that it is made of.  Run it
 after a change of a key: ``python docs/make_scene_reference.py``.
@@ -15,7 +15,7 @@ from ballpass.derive.reading.sections import Section, sections
 from ballpass.derive.scene.keys import ChoiceKey, Key, QuantityKey, VectorKey, WholeKey
 from ballpass.derive.scene.read_keys import Either
 
-PAGE = Path(__file__).parent / "reference" / "scene.md"
+PAGES = sorted((Path(__file__).parent / "reference" / "scene").glob("*.md"))
 TABLE = re.compile(r"(<!-- (keys|usual)(.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -134,4 +134,5 @@ def usual_rows(known: Sequence[Section]) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for path in PAGES:
+        path.write_text(page(path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Write the tables of options in docs/reference/cli.md from the declarations of the commands.
+"""Write the tables of options in docs/reference/cli/ from the declarations of the commands.
 
 ``python -m scripts.option_tables`` writes them anew; ``tests/test_cli_reference.py`` compares.
 """
@@ -13,24 +13,20 @@ import typer.main
 
 from ballpass.runtime.app.cli import app
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "cli.md"
+FOLDER = Path(__file__).resolve().parent.parent / "docs" / "reference" / "cli"
+COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+
+_TABLE = re.compile(r"\| option \| meaning \|\n(?:\|[^\n]*\n)+")
 
 
-def with_tables(page: str) -> str:
-    """The page with the table of each command that has options, as its help has it."""
-    commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    for name, command in commands.items():
-        options = [item for item in command.params if item.param_type_name == "option"]
-        rows = [_row(item) for item in options if item.opts != ["--plugin"]]  # said once, above the tables
-        if not rows:
-            continue
-        table = "\n".join(["| option | meaning |", "| --- | --- |", *rows, ""])
-        section = re.compile(
-            rf"(## `ballpass {name} (?:(?!\n## ).)*?)\| option \| meaning \|\n(?:\|[^\n]*\n)+", re.DOTALL
-        )
-        page, count = section.subn(lambda match, table=table: match[1] + table, page)  # type: ignore[misc]
-        if count != 1:
-            raise SystemExit(f"{PAGE}: no section with a table of options for `ballpass {name}`.")
+def with_table(command: str, page: str) -> str:
+    """The page of a command with the table of its options, as its help has them."""
+    options = [item for item in COMMANDS[command].params if item.param_type_name == "option"]
+    rows = [_row(item) for item in options if item.opts != ["--plugin"]]  # the index says it once for all
+    table = "\n".join(["| option | meaning |", "| --- | --- |", *rows, ""]) if rows else ""
+    page, count = _TABLE.subn(lambda _: table, page)
+    if count != bool(rows):
+        raise SystemExit(f"{FOLDER / command}.md: {count} tables of options, {int(bool(rows))} wanted.")
     return page
 
 
@@ -42,4 +38,6 @@ def _row(option: Any) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for name in COMMANDS:
+        path = FOLDER / f"{name}.md"
+        path.write_text(with_table(name, path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,30 +1,19 @@
-"""Claims about the page of the command line: it has every command and option, and none that is not there."""
+"""Claims about the pages of the command line: they have every command and option, and none that is not there."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-import typer.main
 from rich.emoji import Emoji
-from scripts.option_tables import with_tables
-
-from ballpass.runtime.app.cli import app
-
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "cli.md"
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+from scripts.option_tables import COMMANDS, FOLDER, with_table
 
 OPTION = re.compile(r"--[a-z][a-z-]*")
 
 
-def sections() -> dict[str, str]:
-    """Text of the page's sections by command."""
-    _, *parts = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    named = {match[1]: part for part in parts if (match := re.match(r"`ballpass ([a-z]+)[ `]", part))}
-    assert len(named) == sum(part.startswith("`ballpass ") for part in parts)
-    return named
+def page(command: str) -> str:
+    return (FOLDER / f"{command}.md").read_text(encoding="utf-8")
 
 
 def accepted(command: str) -> Iterator[tuple[str, str]]:
@@ -37,15 +26,22 @@ def accepted(command: str) -> Iterator[tuple[str, str]]:
         yield from ((text, "option") for text in parameter.secondary_opts)
 
 
-def test_page_has_a_section_for_every_command_and_for_nothing_else() -> None:
+def test_every_command_has_a_page_a_row_of_the_index_and_nothing_else_has() -> None:
     assert len(COMMANDS) >= 10
-    assert sorted(sections()) == sorted(COMMANDS)
+    pages = {path.stem for path in FOLDER.glob("*.md")} - {"index"}
+    assert pages == set(COMMANDS)
+    assert all(page(command).startswith(f"# `ballpass {command}") for command in pages)
+    shown, listed = page("index").split("```{toctree}")
+    rows = re.findall(r"^\| \[`ballpass (\w+)`\]\((\w+)\.md\) \| \w", shown, re.MULTILINE)
+    assert all(command == path for command, path in rows)
+    assert [command for command, _ in rows] == listed.partition("```")[0].split()[1:]
+    assert sorted(command for command, _ in rows) == sorted(COMMANDS)
 
 
-def test_tables_of_questions_are_those_of_their_declarations() -> None:
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_tables_of_options_are_those_of_their_declarations(command: str) -> None:
     """Where this fails: python -m scripts.option_tables."""
-    page = PAGE.read_text(encoding="utf-8")
-    assert page == with_tables(page)
+    assert page(command) == with_table(command, page(command))
 
 
 @pytest.mark.parametrize("command", sorted(COMMANDS))
@@ -67,8 +63,7 @@ def test_an_option_means_the_same_to_every_command_that_has_it(option: str) -> N
 
 @pytest.mark.parametrize("command", sorted(COMMANDS))
 def test_page_names_every_option_of_a_command_and_no_other(command: str) -> None:
-    section = sections()[command]
-    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `--")]
+    rows = [line.split("|")[1] for line in page(command).splitlines() if line.startswith("| `--")]
     told = set(OPTION.findall(" ".join(rows)))
     known = dict(accepted(command))
     assert told <= set(known)

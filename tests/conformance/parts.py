@@ -197,7 +197,7 @@ def _effects() -> list[Part]:
             without=shipped("varying_compliance", *_PRESSED),
             path=f"bearing.{name}",
             off=_OFF[name],
-            docs=("reference/scene.md", f"[bearing.{name}"),
+            docs=("reference/scene/index.md", f"[bearing.{name}"),
         )
         for name, table in EFFECT_TABLES.items()
     ]
@@ -235,7 +235,7 @@ def _drives() -> list[Part]:
             text=driven(name, numbers),
             without=CRANK if numbers else "",
             off={f"mechanism.driver.torque.{key}": 0.0 for key in _NO_TORQUE[name]},
-            docs=("reference/scene.md", f'`"{name}"`'),
+            docs=("reference/scene/drive_torque.md", f'`"{name}"`'),
         )
         for name, numbers in TORQUES.items()
     ]
@@ -349,7 +349,7 @@ def _forces() -> list[Part]:
                 without=shaper(""),
                 path=path,
                 off={f"{path}.{key}": 0.0 for key in scale},
-                docs=("reference/scene.md", f"[mechanism.{table}.<name>]"),
+                docs=("reference/scene/index.md", f"[mechanism.{table}.<name>]"),
                 variant=variant,
             )
         )
@@ -369,7 +369,8 @@ def _dyads() -> list[Part]:
         for kind, name in (("RPP", "yoke on a moving body"), ("PRP", "rapson's slide"))
     }
     return [
-        Part(registry="dyad", name=kind, text=text, docs=("reference/scene.md", kind)) for kind, text in texts.items()
+        Part(registry="dyad", name=kind, text=text, docs=("reference/scene/joints.md", kind))
+        for kind, text in texts.items()
     ]
 
 
@@ -401,7 +402,7 @@ def _gears() -> list[Part]:
             registry="gear",
             name=kind,
             text=linkage_text(GEARED[name]()) + bearing(joint, body, elastic=True) + RUN,
-            docs=("reference/scene.md", f'"{kind}"'),
+            docs=("reference/scene/gears.md", f'"{kind}"'),
         )
         for kind, (name, joint, body) in machines.items()
     ]

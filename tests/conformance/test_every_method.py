@@ -58,11 +58,11 @@ every_method, explicit_methods, implicit_methods = named(TABLEAUS), named(EXPLIC
 
 def test_docs_have_a_row_of_every_method() -> None:
     scene, theory = (
-        (ROOT / "docs" / page).read_text("utf-8") for page in ("reference/scene.md", "theory/integration.md")
+        (ROOT / "docs" / page).read_text("utf-8") for page in ("reference/scene/run.md", "theory/integration.md")
     )
     (row,) = [line for line in scene.splitlines() if line.startswith("| `method` |")]
     for name, (order, _) in ORDERS.items():
-        assert f'`"{name}"`' in row, f"docs/reference/scene.md does not name {name}"
+        assert f'`"{name}"`' in row, f"docs/reference/scene/run.md does not name {name}"
         found = re.search(rf"^\| `{name}` \|.*\| {order}\(", theory, re.MULTILINE)
         assert found, f"docs/theory/integration.md has no row of {name} with order {order}"
 

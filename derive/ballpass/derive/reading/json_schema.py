@@ -54,8 +54,8 @@ def describe(key: Key) -> str:
     unit = f" [{key.unit}]" if isinstance(key, QuantityKey | VectorKey) and key.unit != "1" else ""
     example = f", as in {key.sample}" if key.example != "" else ""
     text = f"{meaning(key)}{unit}{example}. {key.note[:1].upper()}{key.note[1:]}".rstrip(". ") + "."
-    # pages are named as the reference page names them
-    return re.sub(r"\{doc\}`([^`]+)`", lambda page: normpath(f"docs/reference/{page[1]}.md"), text)
+    # pages are named as those of the reference name them
+    return re.sub(r"\{doc\}`([^`]+)`", lambda page: normpath(f"docs/reference/scene/{page[1]}.md"), text)
 
 
 def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:

@@ -51,7 +51,7 @@ BRANCH = ChoiceKey(
     optional=True,
     when="required at the inner joint of each dyad with two positions, else refused",
     note="left and right for RRR, ahead and behind for RRP and RPR; RPP and PRP have one position, and no branch or "
-    "`ahead`; see {doc}`../theory/linkage`",
+    "`ahead`; see {doc}`../../theory/linkage`",
 )
 FLYWHEEL = number(
     "kg*m^2",

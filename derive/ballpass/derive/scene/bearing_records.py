@@ -69,7 +69,7 @@ def smoothing_key() -> Any:
         when="optional; default: Hertz's law itself",
         remedy=_WIDTH,
         usual=UsualRange(most=1.0, of="clearance", hint=hint),
-        note="see {doc}`../theory/damping`",
+        note="see {doc}`../../theory/damping`",
     )
 
 
@@ -303,7 +303,7 @@ class Lubrication:
         setting=True,
         bounds=Bounds(least=0.0, most=1.0),
         remedy="write contamination = 0.5 where cleanliness is normal",
-        note="1 is clean; classes in {doc}`../theory/life`",
+        note="1 is clean; classes in {doc}`../../theory/life`",
     )
     cleanliness: str | None = ChoiceKey(
         words="Class of cleanliness of ISO 281",
@@ -445,7 +445,7 @@ class Bearing:
         when="instead of `share`, for both of two bearings on a shaft, or for all of one that tilts",
         needs=_PLACED,
         note="from any plane, which is that of points and loads without a place of their own, in any direction: the "
-        "shares follow by levers, or from the tilts of the shaft, see {doc}`../theory/supports`",
+        "shares follow by levers, or from the tilts of the shaft, see {doc}`../../theory/supports`",
     )
     offset: tuple[SceneNumber, SceneNumber] | None = PairKey(
         unit="m",
@@ -461,7 +461,7 @@ class Bearing:
         choices=("one-way", "two-way"),
         default="one-way",
         note="one-way: the reaction of an ideal linkage loads the bearing; two-way: its clearance and its forces "
-        "act on both bodies, see {doc}`../theory/coupling`. The same for all bearings of a scene",
+        "act on both bodies, see {doc}`../../theory/coupling`. The same for all bearings of a scene",
     ).declared()
     inner_body: str = ""
     beside: str = ""
@@ -518,7 +518,7 @@ class Bearing:
         remedy="give an angle from 0 deg to below 90 deg",
         usual=UsualRange(most=math.radians(50), hint="Angular contact bearings have up to 45 deg: check the unit."),
         note="a constant of the run, with `clearance` as what is left radially; balls only, "
-        "see {doc}`../theory/contact_angle`",
+        "see {doc}`../../theory/contact_angle`",
     )
     axial_displacement: SceneNumber | None = not_negative(
         "m",
@@ -549,7 +549,7 @@ class Bearing:
         when="instead of `contact_angle`",
         needs=_AXIAL,
         remedy="delete the key where there is none",
-        note="of a shaft on the bearing that locates it; the motion stays radial, see {doc}`../theory/life`",
+        note="of a shaft on the bearing that locates it; the motion stays radial, see {doc}`../../theory/life`",
     )
     shoulder_height: float | None = positive(
         "m",

@@ -111,7 +111,7 @@ class Body:
         "J_{t,INDEX}",
         "900 kg*mm^2",
         optional=True,
-        note="of the driven body, which then tilts in its bearings: {doc}`../theory/supports`",
+        note="of the driven body, which then tilts in its bearings: {doc}`../../theory/supports`",
     )
     center_of_mass: Vector = VectorKey(
         unit="m",
@@ -388,7 +388,7 @@ class Shaft:
         "J_t",
         "0.02 kg*m^2",
         optional=True,
-        note="the shaft then tilts in its bearings, which have places: {doc}`../theory/supports`",
+        note="the shaft then tilts in its bearings, which have places: {doc}`../../theory/supports`",
     )
     mass: SceneNumber | None = positive("kg", "Mass of the shaft with the inner rings", "m", "4 kg", needs=_TILTING)
     polar_inertia: SceneNumber | None = positive(
@@ -574,7 +574,7 @@ class RunSettings:
         words="Integrator",
         choices=("auto", *STEPPERS, "cvodes"),
         default="auto",
-        note="see {doc}`../theory/integration`",
+        note="see {doc}`../../theory/integration`",
     ).declared()
     rtol: float = quantity(
         "1",
@@ -584,7 +584,7 @@ class RunSettings:
         setting=True,
         bounds=Bounds(least=TOLERANCES[0], most=TOLERANCES[1]),
         remedy="write rtol = 1e-6 unless another value is needed",
-        note="see {doc}`../theory/integration`",
+        note="see {doc}`../../theory/integration`",
     )
     reliability: float = quantity(
         "1",
@@ -606,7 +606,7 @@ OUTPUTS = NamesKey(
     example='["inner.*", "ball.force"]',
     default=("*",),
     when='default `["*"]`, all',
-    note='only these are computed. {doc}`outputs` lists all, also those on request, such as `"point.slider.C.ay"`',
+    note='only these are computed. {doc}`../outputs` lists all, also those on request, such as `"point.slider.C.ay"`',
 )
 
 

@@ -39,7 +39,7 @@ class HuntCrossley(DampingLaw):
                 "e",
                 0.8,
                 bounds=Bounds(least=0.0, most=1.0),
-                note="accurate near one only, see {doc}`../theory/damping`",
+                note="accurate near one only, see {doc}`../../theory/damping`",
             ),
             "impact_speed": number(
                 "m/s",
