@@ -133,6 +133,18 @@ def test_all_rows_of_two_bearings_are_one_table_of_80_columns(make_model: Callab
     assert "[kg]" in row or "[kg]" in text.splitlines()[text.splitlines().index(row) + 1]
 
 
+def test_rows_that_are_always_zero_are_left_out(make_model: Callable[..., Model]) -> None:
+    """A load along x alone has a zero row of y, which `--all` keeps; a row with one number is kept."""
+    model = make_model("varying_compliance")
+    summary = summarize(model, model.simulate(cycles=2, transient=1))
+    assert (summary["load.y"]["min"], summary["load.y"]["max"]) == (0.0, 0.0)
+    shown, left_out = render_summary(summary, model.manifest)
+    every, _ = render_summary(summary, model.manifest, every=True)
+    loads = [[str(cell) for cell in row if "Load on" in str(row[0])] for row in shown.rows]
+    assert [cells[0][-1] for cells in loads if cells] == ["x"]
+    assert len(every.rows) == len(shown.rows) + left_out
+
+
 def test_a_scene_without_mechanism_has_no_reaction(make_model: Callable[..., Model]) -> None:
     model = make_model("varying_compliance")
     found = summarize(model, model.simulate(cycles=2, transient=1))

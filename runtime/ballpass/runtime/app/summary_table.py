@@ -47,6 +47,8 @@ _INTEGRATION = ("rtol", "steps", "wall_time")
 def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: bool = False) -> tuple[ReportTable, int]:
     """The summary as a table in words, what a reader wants first on top; mean and standard deviation are in the file.
 
+    Rows that are always zero are left out as well.
+
     Parameters
     ----------
     summary : what `summarize` gave
@@ -77,7 +79,7 @@ def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: boo
             if not any(cells):
                 continue
             place = row_place(manifest, row)
-            if place is None and not every:
+            if not every and (place is None or {*cells} <= {"", "0"}):  # or zero all the time
                 left_out += 1
                 continue
             order = math.inf if place is None else float(place)
