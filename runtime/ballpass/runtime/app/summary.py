@@ -110,9 +110,20 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
     values = model.numbers(sol.parameters).values
-    summary["limits"] = list(limits_of_model(manifest, values))
+    summary["limits"] = list(limits_of_model(manifest, values, _moved(steady, summary)))
     summary["warnings"] = [*unusual(manifest, values), *found]
     return summary
+
+
+def _moved(sol: Solution, summary: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """Highest acceleration between samples of each bearing's inner ring [m/s^2] and its highest ball force [N]."""
+    found = {}
+    for bearing in sol.manifest.bearings:
+        peak = summary.get(f"{bearing.prefix}peak_ball_force", {})
+        if bearing.joint and "total" in peak:
+            speeds = [np.diff(sol[f"{bearing.prefix}inner.v{axis}"]) for axis in "xy"]
+            found[bearing.path] = float(np.max(np.hypot(*speeds) / np.diff(sol.t))), peak["total"]
+    return found
 
 
 def _unusual(sol: Solution) -> list[str]:

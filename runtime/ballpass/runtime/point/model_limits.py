@@ -14,15 +14,20 @@ from ballpass.runtime.ratings.of_bearing import fit_clearances, inner_ring_mass
 
 #: Interference that holds a ring: above rounding [m].
 HOLDING = 1e-9
+#: Part of the highest ball force up to which the inertia that a one-way load leaves out does not matter [1].
+LITTLE = 0.01
 _BODY, _MASS = "mechanism.bodies.", ".mass"
 
 
-def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator[str]:
+def limits_of_model(
+    manifest: Manifest, values: Mapping[str, float], moved: Mapping[str, tuple[float, float]] | None = None
+) -> Iterator[str]:
     """Linkages that outweigh the ring of a bearing that is loaded one-way, forces that begin at once, lost preloads.
 
     Parameters
     ----------
     values : parameters and derived constants by name
+    moved : of a run by the bearings' paths: highest acceleration of the inner ring [m/s^2], highest ball force [N]
     """
     for bearing in manifest.bearings:
         yield from (f"{bearing.path}: {words}" for words in limits_of_fit(bearing, values))
@@ -48,12 +53,16 @@ def limits_of_model(manifest: Manifest, values: Mapping[str, float]) -> Iterator
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
     for bearing in manifest.bearings:
         ring = inner_ring_mass(bearing, values)
-        if bearing.joint and ring is not None and linkage > ring:
+        acceleration, force = (moved or {}).get(bearing.path, (math.inf, 0.0))
+        inertia = linkage * acceleration
+        if bearing.joint and ring is not None and linkage > ring and not inertia <= LITTLE * force:
+            size = (
+                f" Left out are up to {inertia:.0f} N of inertia; a ball carries up to {force:.0f} N." if force else ""
+            )
             yield (
-                f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, does not feel the motion of the "
-                f"ring, {ring:.3g} kg{_turning(manifest, values)}. Where the linkage outweighs the ring, peak forces "
-                "may be far too low, and more so the faster it turns. "
-                "`ballpass trade SCENE --against two-way` measures it."
+                f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, {linkage / ring:.2g} times as heavy "
+                f"as the ring, {ring:.3g} kg{_turning(manifest, values)}, does not feel its motion.{size} "
+                "Peak forces may be far off. `ballpass trade SCENE --against two-way` measures it."
             )
     gates = {info.name for info in manifest.inputs if info.kind == "gate"}
     sudden = [name for name, _, _, item in mechanism.forces if item in gates]
