@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,19 @@ def test_what_no_table_has_is_refused(words: tuple[str, str], allowed: str) -> N
     done = CliRunner().invoke(app, ["select", str(SCENES / "rotor.toml"), *words])
     assert done.exit_code == 2
     assert allowed in " ".join(done.stderr.split())
+
+
+def test_a_life_is_refused_at_the_first_bearing_where_nothing_turns(tmp_path: Path) -> None:
+    """All bearings of the tables were run before it said so.  Static safety is found without a life."""
+    text = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^speed = .*", 'speed = "0 rpm"', text)
+    text = re.sub(r"(?m)^cycles = .*\ntransient_cycles = .*", 'duration = "1 ms"', text)
+    (tmp_path / "still.toml").write_text(text, encoding="utf-8")
+    done = CliRunner().invoke(app, ["select", str(tmp_path / "still.toml"), "--life", "1 h"])
+    assert done.exit_code == 2
+    assert "The bearing does not turn. Allowed: a bearing that turns, or static safety without --life" in done.stderr
+    row = asked(str(tmp_path / "still.toml"), "--designation", "6204")["6204"]
+    assert row["static_safety"] > 1.0
 
 
 def test_a_sweep_over_designations_names_the_question_that_does_it() -> None:

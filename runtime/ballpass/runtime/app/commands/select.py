@@ -173,8 +173,8 @@ def select(
     Raises
     ------
     RequestError
-        No bearing of the scene has the name, no bearing of the tables the bore or the designation, or a number of the
-        bearing that a designation gives is overridden.
+        A life is wanted where the bearing does not turn, no bearing of the scene has the name, no bearing of the tables
+        the bore or the designation, or a number of the bearing that a designation gives is overridden.
     """
     from ballpass.derive import SceneError, generate, read_scene
     from ballpass.runtime.model import load_own
@@ -230,16 +230,19 @@ def _room(one: Candidate) -> float:
 def _judged(candidate: Candidate, report: LifeReport, name: str, life: float | None, safety: float) -> Candidate:
     """What a bearing has, over a duty cycle and in its worst state, and lacks."""
     states = [one for state in report.states for one in state.bearings if one.name == name]
-    if not states:
-        return replace(candidate, lacks="nothing turns in any state")
+    why = [one.why_no_life for one in states if one.why_no_life]
+    if not states or (life is not None and len(why) == len(states)):  # of the motion, so with each bearing
+        why = why or ["Nothing turns in any state"]
+        raise RequestError(
+            f"{why[0].partition(':')[0]}. Allowed: a bearing that turns, or static safety without --life."
+        )
     reached = states[0].reached
     lives = [one.modified_hours or one.hours for one in report.duty if one.name == name]
     (hours,) = lives or [None if reached is None else states[0].hours(reached)]
     least = min(one.static_safety for one in states)
     lacks = []
     if life is not None and (hours is None or hours < life / 3600.0):
-        why = next((one.why_no_life for one in states if one.why_no_life), "")
-        lacks.append(why or f"life: {rounded(hours or 0.0, 3)} of {rounded(life / 3600.0, 3)} h")
+        lacks.append(f"life: {rounded(hours or 0.0, 3)} of {rounded(life / 3600.0, 3)} h")
     if least < safety:
         lacks.append(f"s_0: {rounded(least, 3)} of {rounded(safety, 3)}")
     return replace(
