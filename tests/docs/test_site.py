@@ -12,6 +12,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from chromium import opened
 
 SITE = Path(__file__).resolve().parents[2] / "docs" / "_build" / "html"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -21,6 +22,22 @@ pytestmark = [
     pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on PATH"),
     pytest.mark.skipif(not (SITE / "index.html").exists(), reason="`make docs` has not built the site"),
 ]
+
+
+#: Of the page as a telephone shows it: sizes of its words [px], without formulas and pictures.
+SIZES = """(() => {
+  const walk = document.createTreeWalker(document.querySelector("article"), NodeFilter.SHOW_TEXT), sizes = [];
+  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+    const parent = node.parentElement;
+    if (!node.textContent.trim() || parent.closest("svg, mjx-container, script, style")) continue;
+    if (parent.getBoundingClientRect().width) sizes.push(parseFloat(getComputedStyle(parent).fontSize));
+  }
+  return sizes;
+})()"""
+
+#: Pages for users, each of which a telephone shows.
+PAGES = [SITE / "index.html", SITE / "tutorial.html", SITE / "machines.html"]
+PAGES += sorted(path for part in ("readers", "howto", "reference") for path in (SITE / part).rglob("*.html"))
 
 
 class Recorder(SimpleHTTPRequestHandler):
@@ -82,3 +99,15 @@ def test_pages_show_without_a_network(
     assert not re.findall(
         r'<(?:script|img)[^>]* src="https?://(?!127)|<link[^>]* rel="stylesheet" [^>]*href="http', content
     )
+
+
+def test_pages_on_a_telephone_have_words_of_9_pixels_and_do_not_scroll_sideways(tmp_path: Path) -> None:
+    """The result on the landing page had 8.6."""
+    assert len(PAGES) > 90
+    with opened(tmp_path / "home") as browser:
+        browser.call("Emulation.setDeviceMetricsOverride", width=390, height=900, deviceScaleFactor=1, mobile=True)
+        for page in PAGES:
+            browser.open(page)
+            browser.wait("document.readyState === 'complete' && !!document.querySelector('article')")
+            assert min(browser.value(SIZES)) >= 9.0, page
+            assert browser.value("document.documentElement.scrollWidth") <= 390, page
