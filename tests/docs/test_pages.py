@@ -17,6 +17,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scripts.sizes import make_environment
 from typer.testing import CliRunner
 
 from ballpass.derive import generate
@@ -93,10 +95,13 @@ def commands(text: str) -> list[tuple[str, list[str]]]:
     return found
 
 
-def run_command(command: str, folder: Path) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr: `ballpass` alone in this process, what needs a shell in one."""
+def run_command(command: str, folder: Path, installed: dict[str, str] | None = None) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr: `ballpass` alone in this process, what needs a shell in one.
+
+    `installed`: environment of an installed ballpass, which runs everything instead.
+    """
     words = shlex.split(command.replace(".venv/bin/", ""), comments=True)
-    if words[0] == "ballpass" and not SHELL.search(command):
+    if words[0] == "ballpass" and not SHELL.search(command) and installed is None:
         done = CliRunner().invoke(app, words[1:])
         if done.exception is not None and not isinstance(done.exception, SystemExit):
             raise done.exception
@@ -104,16 +109,17 @@ def run_command(command: str, folder: Path) -> tuple[int, str, str]:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     called = subprocess.run(
         ("bash", "-c", command.replace(".venv/bin/", "")),
-        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False, timeout=600,
+        cwd=folder, env=installed or {**os.environ, "PATH": path},
+        capture_output=True, text=True, check=False, timeout=600,
     )  # fmt: skip
     return called.returncode, called.stdout, called.stderr
 
 
-def run_console(text: str, folder: Path) -> None:
+def run_console(text: str, folder: Path, installed: dict[str, str] | None = None) -> None:
     for command, shown in commands(text):
         if any(re.match(pattern, command) for pattern in NOT_RUN):
             continue
-        code, out, err = run_command(command, folder)
+        code, out, err = run_command(command, folder, installed)
         fails = any(line.startswith("error: ") for line in shown)
         assert (code == 2) is fails, f"{command}\n{err[-2000:]}"
         assert fails or code == 0, f"{command}\n{err[-2000:]}"
@@ -181,6 +187,42 @@ def test_blocks_of_a_page_run(page: str, generated: Path, tmp_path: Path, monkey
             fault.add_note(f"{page}, block at line {line}")
             raise
     plt.close("all")
+
+
+@pytest.mark.long
+def test_first_pages_run_as_they_are_printed_from_wheels(tmp_path: Path) -> None:
+    """README, landing page and reader pages, outside the repository: with the wheels, and packages of this environment.
+
+    `tests/test_package.py` installs what the wheels need.
+    """
+    wheels, programs = tmp_path / "wheels", make_environment(tmp_path / "environment")
+    pip = (programs / "python", "-m", "pip", "--quiet", "--disable-pip-version-check")
+    subprocess.run((*pip, "wheel", "--no-deps", "-w", wheels, ROOT / "runtime", ROOT), check=True)
+    subprocess.run((*pip, "install", "--no-index", "--no-deps", *wheels.glob("*.whl")), check=True)
+    (packages,) = programs.parent.glob("lib/python*/site-packages")
+    # a path alone: what is installed there for editing is not followed
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+    installed = {"HOME": str(tmp_path), "PATH": f"{programs}{os.pathsep}{os.defpath}", "MPLBACKEND": "agg"}
+    _, where, _ = run_command("python -c 'import ballpass; print(*ballpass.__path__)'", tmp_path, installed)
+    assert where.strip() == str(packages / "ballpass")
+    readers = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs/readers").glob("*.md"))
+    assert len(readers) == 3
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    # readers' pages make scenes/, which is there where the other two are read; one folder derives each scene once
+    for page in (*readers, "README.md", "docs/index.md"):
+        for kind, text, line in blocks(page):
+            try:
+                if kind == "toml":
+                    (folder / text.partition("\n")[0].removeprefix("# ")).write_text(text, encoding="utf-8")
+                elif kind == "console":
+                    run_console(text, folder, installed)
+                else:
+                    (folder / "block.py").write_text(text, encoding="utf-8")
+                    run_console("python block.py", folder, installed)
+            except AssertionError as fault:
+                fault.add_note(f"{page}, block at line {line}")
+                raise
 
 
 def test_the_index_of_how_to_s_has_a_sentence_for_each() -> None:
