@@ -7,6 +7,7 @@ import re
 import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -130,6 +131,11 @@ def test_figures_for_a_paper_have_its_width_and_letters_of_seven_points(press: R
     else:
         assert float(re.search(rb"/MediaBox \[ 0 0 ([\d.]+)", data)[1]) == pytest.approx(points, rel=1e-6)
         assert b"/Type3" not in data
+        # the right orbit is whole: curves were cut at the width of the page, to which the drawing is scaled
+        streams = [zlib.decompress(part) for part in re.findall(rb"stream\n(x.*?)\nendstream", data, re.DOTALL)]
+        ends = [float(found) for one in streams for found in re.findall(rb"([\d.]+) [\d.]+ l\n", one)]
+        assert sum(end > points for end in ends) > 100
+        assert max(ends) < 9.5 / 7.0 * points
     assert "Orbit" not in texts(figure).replace(caption_of(figure), "")
     figure.draw_without_rendering()
     labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, *axes.texts)]
@@ -137,6 +143,10 @@ def test_figures_for_a_paper_have_its_width_and_letters_of_seven_points(press: R
         box = part.get_window_extent()
         assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.width
         assert 0.0 <= box.y0 <= box.y1 <= figure.bbox.height
+    for axes in figure.axes:  # and the note stands off the path
+        (box,) = (text.get_window_extent() for text in axes.texts)
+        places = np.vstack([axes.transData.transform(line.get_xydata()) for line in axes.lines])
+        assert np.max(places[places[:, 0] > box.x0, 1]) < box.y0
 
 
 def test_captions_stand_beside_the_pictures(press: Run, tmp_path: Path) -> None:

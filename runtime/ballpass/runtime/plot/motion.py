@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
+from ballpass.runtime.plot import PAPER
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.style import (
     APPLIED,
@@ -127,7 +128,7 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
             axes.plot(radius * np.cos(around), radius * np.sin(around), color=GREY, linestyle=(0, (1, 1.5)), zorder=1)
     if not equal:  # room for the words above the path
         bottom, top = axes.get_ylim()
-        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
+        axes.set_ylim(bottom, top + (0.2 if PAPER.get()[0] is None else 0.45) * (top - bottom))  # two lines, or three
     against = " against the outer one" if relative else "'s centre"
     axes.set_xlabel(f"x of the inner ring{against} [µm]")
     axes.set_ylabel(f"y of the inner ring{against} [µm]")

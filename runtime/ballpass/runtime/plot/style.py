@@ -296,6 +296,7 @@ def _save_pdf(figure: Figure, drawn: io.BytesIO, scale: float, given: dict[str, 
 
         def scaled(width: float, height: float) -> None:
             begin(width * scale, height * scale)
+            file.width, file.height = width, height  # to which curves are cut, before they are scaled
             file.output(scale, 0.0, 0.0, scale, 0.0, 0.0, Op.concat_matrix)
 
         file.newPage = scaled
