@@ -358,18 +358,13 @@ def _constants(sol: Solution) -> dict[str, Any]:
             name = f"{bearing.path}.{key}"
             if name in units:
                 found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])
-        speed = _number(sol, bearing.ring_speed)
+        speed = {**sol.constants, **sol.parameters}[bearing.ring_speed]
         if sol.period is not None and speed != 0.0:  # rings that only swing against each other pass no ball
             values = mean_speeds(sol)
             frequencies = frequencies_of(bearing, values)
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found
-
-
-def _number(sol: Solution, name: str) -> float:
-    """A parameter or derived constant."""
-    return float(sol.parameters[name] if name in sol.parameters else sol.constants[name])
 
 
 def _versions(sol: Solution) -> dict[str, Any]:

@@ -118,11 +118,6 @@ def _cell(item: Mapping[str, Any], key: str, factor: float, dust: float = 0.0) -
     return written(item, key, factor)
 
 
-def _of_run(value: float) -> str:
-    """A number about the run: a count whole, others with four digits."""
-    return str(value) if isinstance(value, int) else rounded(value)
-
-
 def render_quantities(manifest: Manifest, found: Mapping[str, Mapping[str, Any]]) -> ReportTable:
     """Quantities of ``--of``, as the summary has them."""
     rows = []
@@ -169,10 +164,11 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
 
 def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
     still = summary["method"] == NOT_INTEGRATED
-    run = [
-        words.format(_of_run(summary[key]["value"]))
-        for key, words in _RUN.items()
-        if key in summary and summary[key]["value"] is not None and not (still and key in _INTEGRATION)
+    told = {key: summary[key]["value"] for key in _RUN if key in summary and not (still and key in _INTEGRATION)}
+    run = [  # counts whole, others with four digits
+        _RUN[key].format(value if isinstance(value, int) else rounded(value))
+        for key, value in told.items()
+        if value is not None
     ]
     laws = {
         key.removesuffix("damping_law").removesuffix("."): law

@@ -50,6 +50,8 @@ def limits_of_model(
         return
     if not manifest.bearings:
         return
+    speed = values.get(mechanism.speed)
+    turning = "" if speed is None else f", at {abs(speed) * 30.0 / math.pi:.4g} rpm"
     linkage = sum(value for name, value in values.items() if name.startswith(_BODY) and name.endswith(_MASS))
     for bearing in manifest.bearings:
         ring = inner_ring_mass(bearing, values)
@@ -61,7 +63,7 @@ def limits_of_model(
             )
             yield (
                 f"{bearing.path} is loaded one-way: the linkage, {linkage:.3g} kg, {linkage / ring:.2g} times as heavy "
-                f"as the ring, {ring:.3g} kg{_turning(manifest, values)}, does not feel its motion.{size} "
+                f"as the ring, {ring:.3g} kg{turning}, does not feel its motion.{size} "
                 "Peak forces may be far off. `ballpass trade SCENE --against two-way` measures it."
             )
     gates = {info.name for info in manifest.inputs if info.kind == "gate"}
@@ -74,12 +76,6 @@ def limits_of_model(
             f"{', '.join(sudden)}: the load begins and ends at once. Peaks behind its edges are the overshoot of a "
             'sudden load; a real one rises: give its window a rise, as rise = "5 deg".'
         )
-
-
-def _turning(manifest: Manifest, values: Mapping[str, float]) -> str:
-    """Speed of the driver in words, where the scene has one speed."""
-    speed = values.get(manifest.mechanism.speed) if manifest.mechanism is not None else None
-    return "" if speed is None else f", at {abs(speed) * 30.0 / math.pi:.4g} rpm"
 
 
 def limits_of_fit(bearing: BearingInfo, values: Mapping[str, float]) -> Iterator[str]:

@@ -183,7 +183,8 @@ def select(
         raise RequestError(f"{scene} is a folder. Allowed: the scene file, whose bearing is replaced by others.")
     info = _place(model.manifest.bearings, bearing or "")
     kinds = list(_kinds(designations, bore))
-    refused = [name for name in parameters if name.startswith(f"{info.path}.") and _is_replaced(name)]
+    given = {*SIZES, *GROOVES, "clearance"}
+    refused = [one for one in parameters if one.startswith(f"{info.path}.") and one.rpartition(".")[2] in given]
     if refused:
         raise RequestError(
             f"--set {', '.join(refused)}: bearings of the tables have their own. Allowed: numbers that no designation "
@@ -217,10 +218,6 @@ def select(
     return Selection(
         title=model.manifest.title, candidates=tuple(sorted(found, key=lambda one: (one.bore, _room(one))))
     )
-
-
-def _is_replaced(name: str) -> bool:
-    return name.rpartition(".")[2] in {*SIZES, *GROOVES, "clearance"}
 
 
 def _room(one: Candidate) -> float:
