@@ -23,9 +23,6 @@ from ballpass.runtime.time.timeline import speed_name
 #: C sources that are the same for every scene, and templates of those that are not.
 STANDALONE = DRIVER / "standalone"
 
-#: First line of every file that is written.
-NOTE = "/* Written by ballpass export. */"
-
 #: Names of parameters that may change in a run.
 _VARYING = re.compile(
     r"(loads?(\.\w+)?|mechanism\.forces\.\w+)\.force\.(x|y|magnitude|direction)"
