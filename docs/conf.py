@@ -8,6 +8,8 @@ from importlib.metadata import version as installed_version
 from pathlib import Path
 from typing import Any
 
+from sphinx.util.display import status_iterator
+
 from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.explore import scene_units
@@ -102,7 +104,10 @@ def write_live_pages(app: Any) -> None:
         return
     folder = Path(app.outdir) / "live"
     folder.mkdir(parents=True, exist_ok=True)
-    for scene in shipped_scenes().values():
+    scenes = shipped_scenes()
+    # named one by one, as Sphinx names its pages: the first time each is compiled for browsers
+    for name in status_iterator(scenes, "writing live pages... ", "brown", len(scenes)):
+        scene = scenes[name]
         model = load(generate(scene))
         model.explore(folder / f"{scene.stem}.html", units=scene_units(scene, model.manifest))
 
