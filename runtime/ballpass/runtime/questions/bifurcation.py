@@ -432,7 +432,7 @@ def _motion(
     begin = Repetition.of(model.manifest, numbers.values).alike_from
 
     def read(count: int, initial: RunEnd | None, first: float, default: float) -> Solution:
-        return model.simulate(
+        run: Solution = model.simulate(
             duration=count * step if initial is not None else first + count * step,
             times=first + step * np.arange(1, count + 1),
             parameters=parameters,
@@ -442,6 +442,7 @@ def _motion(
             transient=0.0,
             progress=lambda _done: each(),
         )
+        return run
 
     count = max(settling, 1) if exponent else settling + readings
     run = read(count, None if start is None else state_at(model, numbers, begin, start), begin, SECTION_RTOL)
