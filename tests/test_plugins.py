@@ -10,10 +10,13 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from ballpass.derive import derive
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 from ballpass.runtime.contract import plugins
 from ballpass.runtime.contract.errors import RequestError
@@ -24,6 +27,19 @@ PAGE = (ROOT / "docs/howto/own_law.md").read_text(encoding="utf-8")
 LAW, TEST = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 PROJECT, TABLE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 NUMBERS = TABLE.split("\n", 2)[2]
+OWN = (ROOT / "tests/machines/own_parts.py").read_text(encoding="utf-8")
+
+#: The press with a part of `OWN` of every kind that a scene names.
+OWN_PRESS = (
+    ('law = "asynchronous"', 'law = "own-motor"\nno_load_speed = "500 rpm"\nstall_torque = "80 N*m"'),
+    *((f"{key} =", f"# {key} =") for key in ("breakdown_torque", "breakdown_slip", "synchronous_speed")),
+    ('law = "one-sided"', 'law = "own-damping"\ncubic = "2e5 N*s^3/m^3"'),
+    ('\nratio = "0.25e-5 s*mm^0.5"', ""),
+    ("balls = 8 ", 'element = "own-ball"\nballs = 8 '),
+    ("[bearing.contact]", '[bearing.swelling]\n2 = "2 um"\n\n[bearing.contact]'),
+    ("[bearing]\n", '[mechanism.springs.air]\nbodies = ["frame", "slider"]\npoints = ["A", "C"]\n[bearing]\n'),
+    ("[bearing]\n", 'drag = "1e3 N*s^3/m^3"\n\n[bearing]\n'),
+)
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -114,13 +130,12 @@ def test_every_command_knows_the_law(command: Run, words: tuple[str, ...]) -> No
 
 
 @pytest.fixture
-def law_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
-    """A module with the page's law, changed; forgotten after the test."""
+def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """A module with a text, changed; forgotten after the test."""
     monkeypatch.setattr(plugins, "_used", {})
     monkeypatch.syspath_prepend(str(tmp_path))
 
-    def write(name: str, *changes: tuple[str, str]) -> str:
-        text = LAW
+    def write(text: str, name: str, *changes: tuple[str, str]) -> str:
         for old, new in changes:
             assert old in text
             text = text.replace(old, new)
@@ -129,6 +144,18 @@ def law_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str
         return name
 
     return write
+
+
+@pytest.fixture
+def law_of(written: Callable[..., str]) -> Callable[..., str]:
+    """A module with the page's law, changed."""
+    return partial(written, LAW)
+
+
+@pytest.fixture
+def own_of(written: Callable[..., str]) -> Callable[..., str]:
+    """A module with the parts of `OWN`, changed."""
+    return partial(written, OWN)
 
 
 def test_the_kit_passes_the_page_s_law(law_of: Callable[..., str]) -> None:
@@ -160,6 +187,47 @@ def test_a_function_with_kinks_is_refused_in_words(law_of: Callable[..., str], f
     old, new = ("rate**3", f"sp.{function}(rate{more}) * rate**2"), ("from types", "import sympy as sp\nfrom types")
     with pytest.raises(RequestError, match=rf'"{function}", whose kinks are not located. Allowed: sympy.Piecewise'):
         check_damping_law("cubic", NUMBERS, plugins=[law_of(f"with_{function}", old, new)])
+
+
+#: Part, what replaces its factor, and words of the refusal.
+KINKED = [
+    ("force", "action.rate**3", "sp.Max(action.rate, 0)", 'The spring "air" has "Max".*`setting.smoothness`'),
+    ("force", "action.rate**3", "sp.Piecewise((1, action.rate > 0), (0, True))", 'The spring "air" has "Piecewise"'),
+    ("torque", "super(Motor, self)", "sp.sign(speed) * super(Motor, self)", 'linear characteristic, has "sign"'),
+    ("torque", "super(Motor, self)", "abs(speed) * super(Motor, self)", '"Abs".*`smoothness = Smoothness.KINKED`'),
+    (
+        "effect",
+        "* super().term",
+        "* sp.Max(0, sp.cos(ball.on_inner)) * super().term",
+        'The effect "swelling" has "Max"',
+    ),
+    (
+        "effect",
+        "* super().term",
+        "* sp.Piecewise((1, sp.cos(ball.on_outer) > 0), (0, True)) * super().term",
+        '"swelling" has "Piecewise".*gate of `edges`',
+    ),
+]
+
+
+@pytest.mark.parametrize(("part", "old", "new", "words"), KINKED)
+def test_a_kink_without_an_event_is_refused_in_every_part(
+    own_of: Callable[..., str], scene_text: Callable[..., str], part: str, old: str, new: str, words: str
+) -> None:
+    plugins.use([own_of(f"kinked_{part}_{KINKED.index((part, old, new, words))}", (old, new))])
+    scene = scene_from_text(scene_text("punching_press_motor", *OWN_PRESS), "press")
+    with pytest.raises(RequestError, match=words):
+        derive(scene)
+
+
+def test_a_law_may_say_that_it_has_kinks(own_of: Callable[..., str], scene_text: Callable[..., str]) -> None:
+    """As ballpass's table over the speed does; a jump stays refused."""
+    name = '    name: ClassVar[str] = "own-motor"\n'
+    said = (name, f"{name}    smoothness = Smoothness.KINKED\n")
+    terms = ("from ballpass.derive.terms import ", "from ballpass.derive.terms import Smoothness, ")
+    plugins.use([own_of("says_so", ("super(Motor, self)", "abs(speed) * super(Motor, self)"), said, terms)])
+    system = derive(scene_from_text(scene_text("punching_press_motor", *OWN_PRESS), "press"))
+    assert ("driver.torque", "kinked") in [(name, word.value) for name, word in system.smoothness]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ symbols only.  Expressions stay as small as on paper, and the visitor of `lower.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
 
@@ -14,6 +15,7 @@ import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber, Vector
+from ballpass.derive.scene.table import listing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.elements import element_words
 
@@ -25,6 +27,11 @@ class ExpressionError(RequestError, TypeError):
     """An expression, as of a law, has a function or a condition that is not computed, or whose kink is not located."""
 
 
+#: Functions with kinks, which are continuous, and with jumps; no step ends there.
+_KINKED = (sp.Abs, sp.Max, sp.Min)
+_JUMPING = (sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
+
+
 class Smoothness(Enum):
     """How often a law may be differentiated along its arguments."""
 
@@ -32,6 +39,29 @@ class Smoothness(Enum):
     SMOOTH = "smooth"  # continuously differentiable
     KINKED = "kinked"  # continuous; the derivative jumps or is unbounded at one point
     DISCONTINUOUS = "discontinuous"  # the value jumps
+
+
+def refuse_kinks(
+    what: str, law: sp.Basic, allowed: str, *, located: Collection[sp.Basic] = (), kinked: bool = False
+) -> None:
+    """Refuse kinks and jumps of a law that no step ends on.
+
+    Parameters
+    ----------
+    what, allowed : of the message
+    located : what a condition must have, so that steps end where it changes
+    kinked : whether the law says that it has kinks, so that continuous functions may have them
+
+    Raises
+    ------
+    ExpressionError
+        There is such a function, or a case distinction without any of `located`.
+    """
+    found = [function.__name__ for function in (*_KINKED * (not kinked), *_JUMPING) if law.has(function)]
+    cases = [case for piecewise in law.atoms(sp.Piecewise) for _, case in piecewise.args]
+    found += ["Piecewise"] * any(case.free_symbols and not case.has(*located) for case in cases)
+    if found:
+        raise ExpressionError(f"{what} has {listing(found)}, whose kinks are not located. Allowed: {allowed}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,14 +23,10 @@ from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.table import listing
-from ballpass.derive.terms import TIME, Definition, ExpressionError, Names, names_of, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, names_of, refuse_kinks, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
-
-#: Functions that a damping law may not have: case distinctions that nothing finds.
-_KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,12 +198,13 @@ def _ball(
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))
     parts = [contact.force(delta)]
     damped = sp.sympify(LAWS[bearing.damping.law].force(delta, delta_rate, names.constant("c_b"), contact, rest))
-    if kinked := [kind.__name__ for kind in _KINKED if damped.has(kind)]:
-        raise ExpressionError(
-            f'The damping law "{bearing.damping.law}" has {listing(kinked)}, whose kinks are not located. Allowed: '
-            "sympy.Piecewise((a, condition), (b, True)), with conditions on the deflection or the rate; "
-            "rest.positive(rate) for the positive part. Write one."
-        )
+    refuse_kinks(
+        f'The damping law "{bearing.damping.law}"',
+        damped,
+        "sympy.Piecewise((a, condition), (b, True)), with conditions on the deflection or the rate; "
+        "rest.positive(rate) for the positive part. Write one.",
+        located=(delta, delta_rate),
+    )
     if contact.width is None and rest.width is None:
         damped = sp.piecewise_fold(damped)  # constants meet in one product
     definitions = [
@@ -292,7 +289,18 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
             sp.diff(cage.spin, TIME) if cage.ring_rate is None else ball_turns(bearing) * cage.share,
         )
     ball = GenericBall(balls=bearing.balls, on_outer=on_outer, on_inner=on_inner, from_first=from_first, spin=spin)
-    taken = sum((EFFECTS[e.kind].term(e, bearing, names, ball) for e in bearing.effects), start=sp.S.Zero)
+    known = (*(i.symbol for i in cage.inputs), *(d.symbol for d in cage.definitions))
+    gates = [symbol for symbol in known if symbol.name.startswith("gate.")]
+    taken: sp.Expr = sp.S.Zero
+    for effect in bearing.effects:
+        term = sp.sympify(EFFECTS[effect.kind].term(effect, bearing, names, ball))
+        refuse_kinks(
+            f'The effect "{effect.kind}"',
+            term,
+            "sympy.Piecewise with a gate of `edges` in each condition, as of a spall; ball.only. Write one.",
+            located=(from_first, *gates),
+        )
+        taken += term
     return own_terms(taken, axes, further, (cos, sin), names, cage.ring_rate) if taken != 0 else None
 
 

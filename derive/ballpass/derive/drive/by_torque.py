@@ -6,14 +6,20 @@ import sympy as sp
 
 from ballpass.derive.drive.angle_state import AngleState, driver_coordinate
 from ballpass.derive.scene.records import Driver
-from ballpass.derive.terms import defined, symbol_of
+from ballpass.derive.terms import Smoothness, defined, refuse_kinks, symbol_of
 
 
 def by_torque(driver: Driver) -> AngleState:
     """Drive of a driver with a law of its torque; speed and angle are the initial ones."""
     angle = driver_coordinate()
     words = "Torque of the drive on the driven body, counter-clockwise"
-    torque = defined("driver.torque", driver.torque.torque(angle.velocity), "N*m", words, "M_d")
+    torque = defined("driver.torque", sp.sympify(driver.torque.torque(angle.velocity)), "N*m", words, "M_d")
+    refuse_kinks(
+        f"The law of the driver, {driver.torque.words()},",
+        torque.expression,
+        "a smooth function; Max, Min and Abs with `smoothness = Smoothness.KINKED` in its class. Write one.",
+        kinked=driver.torque.smoothness is Smoothness.KINKED,
+    )
     return AngleState(
         speed=angle.velocity,
         acceleration=angle.acceleration,

@@ -6,12 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import sympy as sp
+
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.records import Force, Mechanism
+from ballpass.derive.terms import refuse_kinks
 from ballpass.derive.variables import Output, Terms
 
 
@@ -36,8 +39,20 @@ def derive_forces(linkage: Linkage) -> Forces:
     setting = Setting(linkage=linkage)
     loads: dict[str, tuple[AppliedLoad, ...]] = {}
     for force in linkage.mechanism.forces:
+        known, said = len(setting.ledger.definitions), len(setting.smoothness)
         action = force.pathway.act(force, setting)
         loads[force.label] = action.loads(force.law.amount(force, action, setting))
+        refuse_kinks(
+            f'The {force.word} "{force.name}"',
+            sp.Tuple(
+                *(expression for load in loads[force.label] for expression in (*load.force, load.torque)),
+                *(d.expression for d in setting.ledger.definitions[known:]),
+            ),
+            "sympy.Piecewise with the border of a switch of `setting.switches` in each condition, where steps end; "
+            "Max, Min and Abs where `setting.smoothness` says that the force is kinked. Write one.",
+            located=[switch.border.symbol for switch in setting.switches],
+            kinked=len(setting.smoothness) > said,
+        )
     return Forces(
         loads=tuple(load for those in loads.values() for load in those),
         of_each=MappingProxyType(loads),
