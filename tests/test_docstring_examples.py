@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 import ballpass.derive
 import ballpass.runtime
+import ballpass.testing
 from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
 
@@ -34,7 +35,7 @@ WRAPPERS = ("ballpass.jax", "ballpass.torch")
 #: Names by `__all__`, but for errors and warnings; and names of the reference.
 PUBLIC = {
     name: found
-    for package in (ballpass.runtime, ballpass.derive)
+    for package in (ballpass.runtime, ballpass.derive, ballpass.testing)
     for name in package.__all__
     if not (inspect.isclass(found := getattr(package, name)) and issubclass(found, BaseException))
 }

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 from ballpass.runtime.contract import plugins
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.testing import ConformanceError, check_damping_law
+from ballpass.testing import ConformanceError, check_damping_law, check_quantity, check_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs/howto/own_law.md").read_text(encoding="utf-8")
@@ -33,7 +34,7 @@ OWN = (ROOT / "tests/machines/own_parts.py").read_text(encoding="utf-8")
 OWN_PRESS = (
     ('law = "asynchronous"', 'law = "own-motor"\nno_load_speed = "500 rpm"\nstall_torque = "80 N*m"'),
     *((f"{key} =", f"# {key} =") for key in ("breakdown_torque", "breakdown_slip", "synchronous_speed")),
-    ('law = "one-sided"', 'law = "own-damping"\ncubic = "2e5 N*s^3/m^3"'),
+    ('law = "one-sided"', 'law = "own-damping"\ncubic = "1e4 s^3/m^3"'),
     ('\nratio = "0.25e-5 s*mm^0.5"', ""),
     ("balls = 8 ", 'element = "own-ball"\nballs = 8 '),
     ("[bearing.contact]", '[bearing.swelling]\n2 = "2 um"\n\n[bearing.contact]'),
@@ -246,6 +247,53 @@ def test_a_wrong_plugin_is_refused_in_words(
         check_damping_law("cubic", NUMBERS, plugins=[law_of(name, (old, new))])
     with pytest.raises(RequestError, match="no such file"):
         plugins.use(["none.py"])
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("q_unit", 'name="own",', 'name="own", unit="m",', "sum of power times .* over kg"),
+        pytest.param(
+            "q_slope", 'slope=FACTORS["quantities"]', "slope=1.01", "differences, first d.own:", marks=pytest.mark.long
+        ),
+        pytest.param("q_right", "1", "1", "", marks=pytest.mark.long),
+    ],
+)
+def test_the_kit_catches_a_wrong_quantity(
+    own_of: Callable[..., str], name: str, old: str, new: str, words: str
+) -> None:
+    module = own_of(name, (old, new))
+    with pytest.raises(ConformanceError, match=words) if words else nullcontext():
+        check_quantity("own:ball.force", plugins=[module])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "new", "words"),
+    [
+        ("s_right", "action.rate**3", ""),
+        ("s_unit", "action.rate**2", "sum of power times .* over m "),
+        ("s_jump", "TIP**3 * (1 + sp.tanh((action.rate / TIP - 0.2) * 10**12))", "disagree with their second route"),
+    ],
+)
+def test_the_kit_catches_a_wrong_force_of_a_scene(
+    own_of: Callable[..., str], scene_text: Callable[..., str], tmp_path: Path, name: str, new: str, words: str
+) -> None:
+    """A crank-slider that the own motor drives, with the own force between frame and slider."""
+    machine, _, run = re.split(r"\n(?=\[bearing\]|\[run\])", scene_text("offset_slider"))
+    torque = 'law = "own-motor"\nno_load_speed = "700 rpm"\nstall_torque = "80 N*m"'
+    force = 'bodies = ["frame", "slider"]\npoints = ["A", "C"]\ndrag = "1000 N*s^3/m^3"'
+    parts = (
+        f"[mechanism.driver.torque]\n{torque}",
+        '[mechanism.driver.flywheel]\ninertia = "0.1 kg*m^2"',
+        f"[mechanism.springs.air]\n{force}",
+        re.sub("outputs = .*", 'outputs = ["drive_torque"]', run),
+    )
+    (tmp_path / "slider.toml").write_text("\n".join((machine, *parts)), encoding="utf-8")
+    tip = 'sp.Symbol("mechanism.driver.speed", real=True) * sp.Symbol("mechanism.bodies.crank.points.B", real=True)'
+    module = own_of(name, ("action.rate**3", new), ("#: Of a part", f"TIP = {tip}\n\n#: Of a part"))
+    with pytest.raises(ConformanceError, match=words) if words else nullcontext():
+        check_scene(tmp_path / "slider.toml", "mean:driver.speed", cycles=0.5, plugins=[module])
 
 
 #: A method, a kind of quantity and a question that are ballpass's by other names.

@@ -37,18 +37,18 @@ FACTORS = {
 
 
 class Cubic(DampingLaw):
-    """c_3 times the cube of the rate, while the ball touches both raceways."""
+    """c_3 times the elastic force and the cube of the rate."""
 
     name = "own-damping"
-    description = "proportional to the cube of the rate, while the ball is loaded"
-    unit = "N*s^3/m^3"
-    keys = MappingProxyType({"cubic": number(unit, "Cubic damping", "c_3", "2e5 N*s^3/m^3", bounds=NOT_NEGATIVE)})
+    description = "proportional to the elastic force and the cube of the rate"
+    unit = "s^3/m^3"
+    keys = MappingProxyType({"cubic": number(unit, "Cubic damping", "c_3", "1e4 s^3/m^3", bounds=NOT_NEGATIVE)})
 
     def coefficient(self, numbers: Any, stiffness: sp.Expr) -> sp.Expr:
         return numbers["cubic"]
 
     def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Any, rest: Any) -> sp.Expr:
-        return FACTORS["damping_laws"] * contact.gate(delta) * coefficient * rate**3
+        return FACTORS["damping_laws"] * coefficient * contact.force(delta) * rate**3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
