@@ -18,7 +18,7 @@ from jsonschema import Draft202012Validator
 
 from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.app.commands.mcp import TOOLS, arguments_of, command_line, schema_of, server
+from ballpass.runtime.app.commands.mcp import arguments_of, command_line, schema_of, server, tools
 from ballpass.runtime.app.commands.skill import skill_text
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.questions import QUESTIONS
@@ -96,7 +96,7 @@ def numbers(
 
 
 def test_every_command_is_a_tool_and_every_tool_with_json_is_asked_here() -> None:
-    assert set(TOOLS) == set(COMMANDS) - {"mcp", "skill"}
+    assert set(tools()) == set(COMMANDS) - {"mcp", "skill"}
     assert {declared(ask).name for ask in QUESTIONS} <= set(ASKED)
     with_json = {name for name, each in COMMANDS.items() if any("--json" in option.opts for option in each.params)}
     assert set(ASKED) == with_json
@@ -107,7 +107,7 @@ def test_a_tool_gives_the_json_of_its_command_with_the_unit_of_every_number(
     name: str, place: Path, make_model: Callable[..., Model], request: pytest.FixtureRequest
 ) -> None:
     arguments = dict(ASKED[name])
-    if "scene" in schema_of(TOOLS[name])["properties"]:
+    if "scene" in schema_of(tools()[name])["properties"]:
         arguments["scene"] = PRESS
     if name == "dataset":
         _small_data_set(place)
@@ -116,7 +116,7 @@ def test_a_tool_gives_the_json_of_its_command_with_the_unit_of_every_number(
         rows = zip(solution.t.tolist(), solution["inner.y"].tolist(), strict=True)
         lines = ["time [s],inner.y [m]", *(f"{t!r},{y!r}" for t, y in rows)]
         (place / "measured.csv").write_text("\n".join(lines), encoding="utf-8")
-    Draft202012Validator(schema_of(TOOLS[name])).validate(arguments)
+    Draft202012Validator(schema_of(tools()[name])).validate(arguments)
     answer = call(name, **arguments)
     assert not answer.is_error, answer.content[0].text
     found = answer.structured_content
@@ -174,7 +174,7 @@ def test_warnings_stand_behind_the_answer(place: Path) -> None:
 
 
 def test_arguments_of_tools_are_the_options_of_the_command_line() -> None:
-    for name, function in TOOLS.items():
+    for name, function in tools().items():
         schema = schema_of(function)
         Draft202012Validator.check_schema(schema)
         flags = {
@@ -210,7 +210,7 @@ def test_skill_names_every_command_and_every_option() -> None:
     """By the first of names that mean the same."""
     text = skill_text()
     sections = {part.split(maxsplit=2)[1].rstrip("`"): part for part in text.split("\n### ")[1:]}
-    assert set(sections) == set(TOOLS)
+    assert set(sections) == set(tools())
     for name, section in sections.items():
         for option in COMMANDS[name].params:
             if option.name == "plugin":  # of the machine's user, for all commands

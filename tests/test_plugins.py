@@ -10,18 +10,23 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ballpass.derive import derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
+from ballpass.runtime.app.commands.mcp import tools
+from ballpass.runtime.app.commands.skill import skill_text
+from ballpass.runtime.ask.kept_parts import kept_parts
 from ballpass.runtime.contract import plugins
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.testing import ConformanceError, check_damping_law, check_quantity, check_scene
+from test_agents import call, numbers
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs/howto/own_law.md").read_text(encoding="utf-8")
@@ -45,15 +50,25 @@ OWN_PRESS = (
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def install(site: Path, law: str = LAW) -> None:
-    """The page's package as an installer leaves it."""
-    info = site / "cubic_damping-0.1.dist-info"
+POINTS = PROJECT.partition("entry-points.ballpass]\n")[2].partition("\n\n")[0].replace('"', "") + "\n"
+
+
+def install(site: Path, text: str = LAW, module: str = "cubic_damping", points: str = POINTS) -> None:
+    """A package, that of the page, as an installer leaves it."""
+    info = site / f"{module}-0.1.dist-info"
     info.mkdir(parents=True, exist_ok=True)
-    (site / "cubic_damping.py").write_text(law, encoding="utf-8")
-    points = re.search(r"entry-points.ballpass\]\n(.*?)\n\n", PROJECT, re.DOTALL)
-    assert points
-    (info / "entry_points.txt").write_text("[ballpass]\n" + points[1].replace('"', "") + "\n", encoding="utf-8")
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cubic-damping\nVersion: 0.1\n", encoding="utf-8")
+    (site / f"{module}.py").write_text(text, encoding="utf-8")
+    (info / "entry_points.txt").write_text(f"[ballpass]\n{points}", encoding="utf-8")
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 0.1\n", encoding="utf-8")
+
+
+def run_command(place: Path, *words: str, site: str = "site") -> subprocess.CompletedProcess[str]:
+    """``ballpass`` in a process of its own."""
+    paths = [*([str(place / site)] if site else []), os.environ.get("PYTHONPATH", "")]
+    # -P: the folder of the command is no place of modules, as for the installed command
+    given = [sys.executable, "-P", "-c", "from ballpass.runtime.app.entry import main; main()", *words]
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    return subprocess.run(given, capture_output=True, text=True, check=False, cwd=place, env=env, timeout=300)
 
 
 @pytest.fixture(scope="module")
@@ -69,14 +84,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def command(place: Path) -> Run:
-    def run(*words: str, site: str = "site") -> subprocess.CompletedProcess[str]:
-        paths = [*([str(place / site)] if site else []), os.environ.get("PYTHONPATH", "")]
-        # -P: the folder of the command is no place of modules, as for the installed command
-        given = [sys.executable, "-P", "-c", "from ballpass.runtime.app.entry import main; main()", *words]
-        env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
-        return subprocess.run(given, capture_output=True, text=True, check=False, cwd=place, env=env, timeout=300)
-
-    return run
+    return partial(run_command, place)
 
 
 def highest(done: subprocess.CompletedProcess[str]) -> float:
@@ -296,48 +304,88 @@ def test_the_kit_catches_a_wrong_force_of_a_scene(
         check_scene(tmp_path / "slider.toml", "mean:driver.speed", cycles=0.5, plugins=[module])
 
 
-#: A method, a kind of quantity and a question that are ballpass's by other names.
-OTHERS = """
-from dataclasses import replace
+# parts of every kind
 
-from ballpass.runtime.contract.method_registry import OWN
-from ballpass.runtime.quantity.kinds.extremes import KINDS
-from ballpass.runtime.questions.question import Question
-
-TOP = replace(next(kind for kind in KINDS if kind.name == "max"), name="top", also=("uppermost",))
-PAIR = replace(OWN["dp54"], name="My Pair 5(4)", number=1)
+#: What asks for the numbers of a part; others are those of a run.
+ASK_OWN = {
+    "rated_elements": ("life", "press.toml", "--cycles", "1", "--transient", "0", "--json"),
+    "questions": ("count_states", "press.toml", "--json"),
+}
+RUN_OWN = (*RUN, "--of", "own:ball.force", "--method", "stepper-ownpair")
 
 
-@Question()
-def count_states(model, *, parameters=None):
-    'How many states a model has.'
-    return len(model.states)
+@pytest.mark.long
+def test_a_part_of_any_kind_changed_by_a_factor_changes_the_numbers(
+    tmp_path: Path, scene_text: Callable[..., str]
+) -> None:
+    """Found by its entry point, and named by ``--plugin``."""
+    (tmp_path / "press.toml").write_text(scene_text("punching_press_motor", *OWN_PRESS), encoding="utf-8")
+    points = "".join(f"{kind} = own_parts\n" for kind in plugins.GROUPS)
 
+    def answer(kind: str, *first: str, site: str = "site") -> str:
+        done = run_command(tmp_path, *first, *ASK_OWN.get(kind, RUN_OWN), site=site)
+        assert done.returncode == 0 or kind == "rated_elements", done.stderr
+        found = json.loads(done.stdout)
+        return repr(found.get("quantities") or found.get("number") or found["states"])
 
-BALLPASS = (TOP, PAIR, count_states)
-"""
+    install(tmp_path / "site", OWN, "own_parts", points)
+    before = {kind: answer(kind) for kind in ("effects", *ASK_OWN)}
+    for kind in plugins.GROUPS:
+        install(tmp_path / "site", OWN.replace(f'"{kind}": 1,', f'"{kind}": 3,'), "own_parts", points)
+        assert answer(kind) != before.get(kind, before["effects"]), kind
+    install(tmp_path / "site", OWN, "own_parts", points)
+    for kind, found in before.items():
+        assert answer(kind, "--plugin", "site/own_parts.py", site="") == found, kind
 
 
 @pytest.mark.long
 def test_methods_quantities_and_questions_of_a_module(
-    make_model: Callable[..., Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_model: Callable[..., Model], own_of: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They give what those of ballpass give, which they are; forgotten, none of them is there."""
-    monkeypatch.setattr(plugins, "_used", {})
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    folder = make_model("varying_compliance").folder
-    (tmp_path / "other_things.py").write_text(OTHERS, encoding="utf-8")
-    model = load(folder, plugins=[str(tmp_path / "other_things.py")])
-    assert model.count_states() == len(model.states)  # type: ignore[operator]
+    model = load(make_model("varying_compliance").folder, plugins=[own_of("own_in_python")])
+    assert model.count_states().number == len(model.states)  # type: ignore[operator]
     run = {"cycles": 0.2, "transient": 0}
-    own, mine = (model.simulate(method=f"stepper-{name}", **run) for name in ("dp54", "mypair54"))
+    own, mine = (model.simulate(method=f"stepper-{name}", **run) for name in ("dp54", "ownpair"))
     assert (own.x == mine.x).all()
-    found = model.quantities(["max:ball.force", "top:ball.force", "uppermost:ball.force"], **run)
+    found = model.quantities(["mean:ball.force", "own:ball.force"], **run)
     assert len({value.value for value in found.values()}) == 1
     monkeypatch.setattr(plugins, "_used", {})
     assert not hasattr(model, "count_states")
-    with pytest.raises(RequestError, match="no kind of quantity 'top'"):
-        model.quantities(["top:ball.force"], **run)
+    with pytest.raises(RequestError, match="no kind of quantity 'own'"):
+        model.quantities(["own:ball.force"], **run)
+
+
+def test_parts_kept_of_a_killed_call_are_not_those_of_a_changed_plugin(
+    make_model: Callable[..., Model], own_of: Callable[..., str], tmp_path: Path
+) -> None:
+    model = load(make_model("varying_compliance").folder, plugins=[own_of("own_kept")])
+    key, found = np.zeros(1), []
+    for change in ((), (('"quantities": 1,', '"quantities": 3,'),)):
+        own_of("own_kept", *change)
+        with suppress(KeyboardInterrupt), kept_parts(tmp_path / "kept", model, "own:ball.force") as parts:
+            found.append(parts.read(key))
+            parts.write(key, (np.ones(1),))
+            raise KeyboardInterrupt
+    assert found == [None, None]
+
+
+@pytest.mark.long
+def test_a_question_of_a_plugin_is_a_tool_of_agents(
+    tmp_path: Path, scene_text: Callable[..., str], monkeypatch: pytest.MonkeyPatch, own_of: Callable[..., str]
+) -> None:
+    """By ``ballpass mcp`` and in ``ballpass skill``; the unit of every number; the processes of tools know it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
+    (tmp_path / "rotor.toml").write_text(scene_text("varying_compliance"), encoding="utf-8")
+    assert "count_states" not in tools()
+    plugins.use([str(tmp_path / f"{own_of('own_tool')}.py")])
+    assert "### `ballpass count_states SCENE`" in skill_text()
+    answer = call("count_states", scene="rotor.toml")
+    assert not answer.is_error, answer.content[0].text
+    assert answer.structured_content["number"] == 4
+    assert [path for path, unit in numbers(answer.structured_content) if not unit] == []
+    assert not call("run", scene="rotor.toml", of=["own:ball.force"], figures=False).is_error
 
 
 def test_sources_beside_a_module_and_within_a_package_are_in_the_digest(

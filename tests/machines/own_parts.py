@@ -141,9 +141,9 @@ class States:
 
 
 @Question(runs=False)
-def states(model: Any, *, parameters: Any = None) -> States:
+def count_states(model: Any, *, parameters: Any = None) -> States:
     """Count the states of a model."""
     return States(number=FACTORS["questions"] * len(model.states))
 
 
-BALLPASS = (Cubic(), Drag, Motor, OwnBall(), RatedOwnBall(), Swelling(), OWN_MEAN, OWN_PAIR, states)
+BALLPASS = (Cubic(), Drag, Motor, OwnBall(), RatedOwnBall(), Swelling(), OWN_MEAN, OWN_PAIR, count_states)

@@ -74,10 +74,12 @@ def plugins_of(scene: Scene) -> tuple[tuple[str, str], ...]:
     from ballpass.derive.bearing.effects import EFFECTS
     from ballpass.derive.bearing.elements import ELEMENTS
     from ballpass.derive.bearing.laws import LAWS
+    from ballpass.runtime.ratings.elements import RATED
 
     used: list[object] = []
     for bearing in scene.bearings:
-        used += [LAWS[bearing.damping.law], ELEMENTS[bearing.element], *(EFFECTS[e.kind] for e in bearing.effects)]
+        used += [LAWS[bearing.damping.law], ELEMENTS[bearing.element], RATED[bearing.element]]
+        used += [EFFECTS[effect.kind] for effect in bearing.effects]
     if (mechanism := scene.mechanism) is not None:
         used += [mechanism.driver.torque, *(part for force in mechanism.forces for part in (force.pathway, force.law))]
     return tuple((name, digest_of(name) or "") for name in modules_of(*used))

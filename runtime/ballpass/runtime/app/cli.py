@@ -11,14 +11,12 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from ballpass.runtime.app.commands.command_list import ASK, COMMANDS
-from ballpass.runtime.app.commands.declared import Command, Plugins, as_command, question_command
+from ballpass.runtime.app.commands.command_list import ASK, COMMANDS, with_plugins
+from ballpass.runtime.app.commands.declared import Command, Plugins, as_command
 from ballpass.runtime.app.commands.mcp import mcp
 from ballpass.runtime.app.commands.shared import command, complain
 from ballpass.runtime.app.commands.skill import skill
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.questions import added_questions
-from ballpass.runtime.questions.question import declared
 
 #: Names that are looked for, and the commands that do it.
 MEANT = {"simulate": "run", "solve": "run", "fmu": "export --fmu"}
@@ -40,17 +38,17 @@ class Commands(TyperGroup):
         if own is not None or cmd_name in MEANT:
             return own
         with command():
-            found = {declared(ask).name: ask for ask in added_questions().values()}
+            found = with_plugins()[ASK]
         if cmd_name not in found:
             return None
         extra = typer.Typer(add_completion=False)
-        extra.command(cmd_name, cls=Command, rich_help_panel=ASK)(as_command(question_command(found[cmd_name])))
+        extra.command(cmd_name, cls=Command, rich_help_panel=ASK)(as_command(found[cmd_name]))
         return typer.main.get_command(extra)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Those of ballpass, and questions of plugins."""
         with command():
-            return [*super().list_commands(ctx), *(declared(ask).name for ask in added_questions().values())]
+            return list(dict.fromkeys((*super().list_commands(ctx), *with_plugins()[ASK])))
 
 
 app = typer.Typer(

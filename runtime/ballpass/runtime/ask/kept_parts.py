@@ -20,6 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError
 from ballpass.runtime.contract.folders import replace_file
+from ballpass.runtime.contract.plugins import digests
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.loaded_model import LoadedModel
 
@@ -108,7 +109,7 @@ def kept_parts(folder: str | Path | None, model: LoadedModel, *decides: Any) -> 
     place = Path(folder)
     refuse_other_files(place)
     place.mkdir(parents=True, exist_ok=True)
-    parts = KeptParts(place, (__version__, asdict(model.manifest), *decides))
+    parts = KeptParts(place, (__version__, digests(), asdict(model.manifest), *decides))
     yield parts
     try:
         for path in place.iterdir():

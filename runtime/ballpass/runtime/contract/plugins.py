@@ -30,8 +30,8 @@ TUPLE = "BALLPASS"
 
 T = TypeVar("T")
 
-#: Modules that `use` was called with, in that order.
-_used: dict[str, None] = {}
+#: Modules that `use` was called with, in that order, and what named them: absolute paths of files.
+_used: dict[str, str] = {}
 
 #: Names of the modules that list an object, by its identity.
 _listed_by: dict[int, set[str]] = {}
@@ -62,7 +62,12 @@ def use(names: Iterable[str]) -> None:
                 sys.path.insert(0, folder)
         module = path.stem if path.suffix == ".py" else name
         _entries(module)
-        _used[module] = None
+        _used[module] = str(path.absolute()) if path.suffix == ".py" else name
+
+
+def used() -> tuple[str, ...]:
+    """What another process must `use` to have the same plugins."""
+    return tuple(_used.values())
 
 
 def used_modules() -> set[str]:
@@ -113,6 +118,12 @@ def digest_of(module: str) -> str | None:
         for path in sorted(path for path in folder.glob(pattern) if path.is_file() and path.suffix != ".pyc"):
             digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def digests() -> dict[str, str | None]:
+    """Digest of every plugin that can be looked up, by its top-level module: what else decides a result."""
+    modules = (*(point.value for point in _points()), *_used)
+    return {name: digest_of(name) for name in sorted({module.partition(".")[0] for module in modules})}
 
 
 class Registry(Mapping[str, T]):

@@ -29,6 +29,7 @@ from ballpass.runtime.contract.errors import CompileError, RequestError, Simulat
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folder import read_artefact, read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
+from ballpass.runtime.contract.plugins import use, used
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compile import compile_model
 from ballpass.runtime.native.compilers import need_compiler
@@ -61,11 +62,13 @@ class Packed:
     key : digest of the content
     content : the files, as a ZIP archive
     version : of this package
+    plugins : that it was loaded with
     """
 
     key: str
     content: bytes = field(repr=False)
     version: str
+    plugins: tuple[str, ...]
 
 
 def pack(model: LoadedModel) -> Packed:
@@ -77,7 +80,7 @@ def pack(model: LoadedModel) -> Packed:
         for name, digest in model.manifest.files:
             archive.writestr(zipfile.ZipInfo(name), read_unchanged(model.folder / name, digest), zipfile.ZIP_DEFLATED)
     content = memory.getvalue()
-    return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=__version__)
+    return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=__version__, plugins=used())
 
 
 #: Folders that were sent to this process, by their keys.
@@ -92,6 +95,7 @@ def loaded(key: str) -> LoadedModel:
         raise RequestError(
             f"A worker has ballpass {__version__}, and {packed.version} sent it work. Install one version everywhere."
         )
+    use(packed.plugins)
     place = Path(tempfile.mkdtemp(prefix="ballpass-"))
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:

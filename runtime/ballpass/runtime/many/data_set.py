@@ -25,6 +25,7 @@ from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import LOCK, locked, refuse_full_disk
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
+from ballpass.runtime.contract.plugins import digests
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.cluster import loaded, run_tasks
 from ballpass.runtime.many.data_set_store import (
@@ -276,6 +277,7 @@ def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: in
 
     return {
         "title": title,
+        "plugins": digests(),
         "seed": seed,
         "chunk": chunk,
         "signals": asdict(replace(signals, snr=None)) | {_SNR: plain(signals.snr)},

@@ -20,7 +20,7 @@ from ballpass.runtime.app.commands.select import select
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import trade
-from ballpass.runtime.questions import QUESTIONS
+from ballpass.runtime.questions import QUESTIONS, added_questions
 
 
 def _named(*functions: Callable[..., None]) -> dict[str, Callable[..., None]]:
@@ -38,3 +38,8 @@ COMMANDS = {
     "Simulate and export": _named(run, export, animate, explore, dataset, stream, sweep),
     ASK: _named(*map(question_command, _ASKED)),
 }
+
+
+def with_plugins() -> dict[str, dict[str, Callable[..., None]]]:
+    """The same with the questions of plugins, looked up now."""
+    return COMMANDS | {ASK: COMMANDS[ASK] | _named(*map(question_command, added_questions().values()))}

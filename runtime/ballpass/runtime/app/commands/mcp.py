@@ -17,7 +17,7 @@ from inspect import Parameter
 from subprocess import DEVNULL
 from typing import Any, get_args
 
-from ballpass.runtime.app.commands.command_list import COMMANDS
+from ballpass.runtime.app.commands.command_list import with_plugins
 from ballpass.runtime.app.commands.declared import parameters_of
 from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.app.commands.skill import RULES
@@ -26,11 +26,9 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Option, is_of, literals
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.plugins import used
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.questions.question import summary_of
-
-#: By the names of the tools.
-TOOLS = {name: function for group in COMMANDS.values() for name, function in group.items()}
 
 #: Lines of progress on stderr.
 _STAGE = re.compile(r"^ *\d+\.\d s  .*\n", re.MULTILINE)
@@ -43,6 +41,11 @@ def mcp() -> None:
     import anyio  # of the same extra
 
     anyio.run(_serve)
+
+
+def tools() -> dict[str, Callable[..., None]]:
+    """Commands by the names of their tools, with questions of plugins."""
+    return {name: function for group in with_plugins().values() for name, function in group.items()}
 
 
 async def _serve() -> None:
@@ -58,13 +61,13 @@ def server() -> Any:
     from mcp import types
     from mcp.server import Server
 
-    tools = [
+    known = [
         types.Tool(name=name, description=summary_of(function), input_schema=schema_of(function))
-        for name, function in TOOLS.items()
+        for name, function in tools().items()
     ]
 
     async def listed(*_: Any) -> types.ListToolsResult:
-        return types.ListToolsResult(tools=tools)
+        return types.ListToolsResult(tools=known)
 
     async def called(_: Any, asked: types.CallToolRequestParams) -> types.CallToolResult:
         words, answer, failed = await _answer(asked.name, asked.arguments or {})
@@ -82,12 +85,13 @@ async def _answer(name: str, given: Mapping[str, Any]) -> tuple[tuple[str, ...],
     import anyio
 
     try:
-        if name not in TOOLS:
-            raise RequestError(unknown_name("tool", name, TOOLS))
+        if name not in (known := tools()):
+            raise RequestError(unknown_name("tool", name, known))
         words = command_line(name, given)
     except RequestError as fault:
         return (f"error: {fault}",), None, True
-    program = [sys.executable, "-c", "from ballpass.runtime.app.entry import main; main()", *words]
+    program = [sys.executable, "-c", "from ballpass.runtime.app.entry import main; main()"]
+    program += [*(f"--plugin={plugin}" for plugin in used()), *words]
     plain = {**os.environ, "FORCE_COLOR": "", "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
     done = await anyio.run_process(program, stdin=DEVNULL, check=False, env=plain)
     result, said = done.stdout.decode(), _STAGE.sub("", done.stderr.decode())
@@ -147,9 +151,10 @@ def command_line(name: str, given: Mapping[str, Any]) -> list[str]:
     RequestError
         An argument that the command does not have, or a value that is no text, number or list of these.
     """
-    known = arguments_of(TOOLS[name])
+    function = tools()[name]
+    known = arguments_of(function)
     words, places, faults = [name], {}, []
-    words += ["--json"] if "json_" in parameters_of(TOOLS[name])[1] else []
+    words += ["--json"] if "json_" in parameters_of(function)[1] else []
     for argument, value in given.items():
         if argument not in known:
             faults.append(f"{name}: {unknown_name('argument', argument, known)}")

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from ballpass.runtime.app.commands.command_list import COMMANDS
+from ballpass.runtime.app.commands.command_list import with_plugins
 from ballpass.runtime.app.commands.declared import parameters_of
 from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.contract.folders import replace_file
@@ -60,7 +60,7 @@ def skill(
 def skill_text() -> str:
     """The page."""
     parts = [_HEADER, "# ballpass\n", RULES, "Exit codes: 0 done, 1 the computation failed, 2 the request was wrong.\n"]
-    for group, functions in COMMANDS.items():
+    for group, functions in with_plugins().items():
         parts += [f"## {group}\n", *(_section(name, function) for name, function in functions.items())]
     return "\n".join(parts)
 
