@@ -289,8 +289,7 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
             sp.diff(cage.spin, TIME) if cage.ring_rate is None else ball_turns(bearing) * cage.share,
         )
     ball = GenericBall(balls=bearing.balls, on_outer=on_outer, on_inner=on_inner, from_first=from_first, spin=spin)
-    known = (*(i.symbol for i in cage.inputs), *(d.symbol for d in cage.definitions))
-    gates = [symbol for symbol in known if symbol.name.startswith("gate.")]
+    gates = (*(i.symbol for i in cage.inputs), *(d.symbol for d in cage.definitions))
     taken: sp.Expr = sp.S.Zero
     for effect in bearing.effects:
         term = sp.sympify(EFFECTS[effect.kind].term(effect, bearing, names, ball))

@@ -180,11 +180,10 @@ class Visitor:
             return _ellipticity(self(expression.args[0]))
         function = _FUNCTIONS.get(expression.func)
         if function is None:
-            known = sorted(str(getattr(f, "__name__", f)) for f in _FUNCTIONS if f not in _KINKED)
+            known = sorted(str(getattr(f, "__name__", f)) for f in _FUNCTIONS)
             raise ExpressionError(
                 f"no CasADi expression is known for {expression.func.__name__} in {expression}. Allowed: powers, "
-                f"{', '.join(known)}, and Piecewise in place "
-                f"of {', '.join(f.__name__ for f in _KINKED)}, whose slopes are not computed."
+                f"Piecewise, {', '.join(known)}."
             )
         return function(*(self(a) for a in expression.args))
 
@@ -336,10 +335,6 @@ def _ellipticity(ratio: ca.SX) -> ca.SX:
         slope = 1 / quotient - 2 / m + quotient * square / m
         log_kappa = log_kappa - residual / slope
     return ca.exp(log_kappa)
-
-
-#: Functions with kinks or jumps that no step would end on.
-_KINKED = (sp.Abs, sp.Max, sp.Min, sp.floor, sp.sign)
 
 
 def _fold(function: Callable[[ca.SX, ca.SX], ca.SX]) -> Callable[..., ca.SX]:
