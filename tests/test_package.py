@@ -162,3 +162,30 @@ def test_wheels_run_from_elsewhere_first_the_runtime_alone_then_the_whole(
         (told,) = re.findall(rf"^\| `{what}` \|.*\| (\d+) \|$", page, flags=re.MULTILINE)
         if sys.platform == "linux":
             assert megabytes == pytest.approx(float(told), rel=0.1), what
+
+    # the package of the page about a law of one's own, from its wheel
+    page = (ROOT / "docs" / "howto" / "own_law.md").read_text(encoding="utf-8")
+    (law, test), (project, table) = (
+        re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL) for kind in ("python", "toml")
+    )
+    package = tmp_path / "cubic-damping"
+    package.mkdir()
+    (package / "cubic_damping.py").write_text(law, encoding="utf-8")
+    (package / "pyproject.toml").write_text(project, encoding="utf-8")
+    subprocess.run((sys.executable, "-m", "build", "--wheel", "--outdir", archives, package), check=True)
+    install(programs, archives, "cubic-damping")
+    text = (work / scene).read_text(encoding="utf-8")
+    own = re.sub(r"\[bearing\.damping\]\n(.+\n)+", lambda _: table, text)
+    assert own != text
+    (work / "my_press.toml").write_text(own, encoding="utf-8")
+    short, vary = ("--cycles", "3", "--transient", "2"), ("--vary", "bearing.damping.cubic=1e4 s^3/m^3:2e4 s^3/m^3:2")
+    run = ("run", "my_press.toml", *short, "--json", "--no-figures")
+    peak = json.loads(ballpass(*run))["peak_ball_force"]
+    assert peak != json.loads(ballpass(*run, "--set", "bearing.damping.cubic=1e5 s^3/m^3"))["peak_ball_force"]
+    ballpass("sweep", "my_press.toml", *vary, "--of", "peak_ball_force", *short, "--no-figures")
+    ballpass("sensitivity", "my_press.toml", "--of", "peak_ball_force", "--wrt", "bearing.damping.cubic", *short)
+    ballpass("export", "my_press.toml", "--fmu", "--out", "my_press.fmu")
+    for command in ("equations", "explain", "linearize", "steady"):
+        ballpass(command, "my_press.toml")
+    checked = call(programs / "python", "-c", f"{test}\n\ntest_the_cubic_law()")
+    assert checked.returncode == 0, checked.stderr
