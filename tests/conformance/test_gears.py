@@ -153,7 +153,7 @@ def test_runs_with_a_bearing_agree(where: tuple[str, str], model_of: Callable[..
 
 def test_turns_of_a_body_are_counted_over_all_turns_of_the_ratio() -> None:
     """Of one that turns once in two turns of the driver: half a turn in each."""
-    half = Turns(sp.cos(DRIVER_ANGLE / 2), sp.sin(DRIVER_ANGLE / 2), 2)
+    half = Turns(sp.cos(DRIVER_ANGLE / 2), sp.sin(DRIVER_ANGLE / 2), DRIVER_ANGLE, sp.Integer(1), 2)
     assert float(Visitor({}, {})(half)) == 0.5
 
 

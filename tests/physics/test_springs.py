@@ -135,3 +135,46 @@ def test_a_torsion_spring_between_bodies_that_turn_warns_in_every_question(make_
         if isinstance(found, Solution):
             torque = found["torsion_spring.twist.torque"]
             assert np.count_nonzero(np.abs(torque - np.roll(torque, 1)) > 30.0 * np.pi) == 1
+
+
+GEARED = """[mechanism.driver]
+joint = "A"
+speed = "3 rad/s"
+[mechanism.frame.points]
+A = "origin"
+B = "100 mm"
+[mechanism.bodies.pinion]
+mass = "0.5 kg"
+inertia = "0.01 kg*m^2"
+center_of_mass = "origin"
+points = { A = "origin" }
+[mechanism.bodies.wheel]
+mass = "0.5 kg"
+inertia = "0.01 kg*m^2"
+center_of_mass = "origin"
+points = { B = "origin" }
+[mechanism.joints]
+A = { type = "revolute", bodies = ["frame", "pinion"] }
+B = { type = "revolute", bodies = ["frame", "wheel"] }
+[mechanism.gears.pair]
+bodies = ["pinion", "wheel"]
+teeth = [20, 60]
+[mechanism.torsion_springs.twist]
+bodies = ["frame", "wheel"]
+stiffness = "10 N*m/rad"
+free_angle = "1 rad"
+[run]
+cycles = 3
+"""
+
+
+def test_a_torsion_spring_at_a_slow_wheel_jumps_half_a_turn_from_its_free_angle(
+    model_of: Callable[..., Model],
+) -> None:
+    """One turn of the wheel in three of the driver: its jump was anywhere."""
+    with pytest.warns(UnusualWarning, match="turns = -0.3333: unusual"):
+        run = model_of(GEARED).simulate()
+    excess = -run.t - 1.0
+    np.testing.assert_allclose(
+        run["torsion_spring.twist.torque"], 10.0 * (excess - 2.0 * np.pi * np.round(excess / (2.0 * np.pi))), atol=1e-9
+    )

@@ -187,3 +187,99 @@ def test_a_bearing_loaded_one_way_is_refused() -> None:
     one_way = BEARING.replace('coupling = "two-way"', 'share = 1.0\ninner_ring = { mass = "0.4 kg" }')
     with pytest.raises(SceneError, match="two-way"):
         derive(scene_from_text(ROCKERS.replace("[run]", one_way), "wrong"))
+
+
+TWIST = """[mechanism.torsion_springs.twist]
+bodies = ["frame", "arm"]
+stiffness = "10 N*m/rad"
+free_angle = "50 deg"
+[mechanism.torsion_stops.limit]
+bodies = ["arm", "frame"]
+stiffness = "400 N*m/rad"
+free_angle = "-120 deg"
+"""
+
+
+@pytest.mark.parametrize("amplitude", [100.0, 150.0, 400.0])
+def test_spring_and_balls_of_a_pendulum_follow_it_over_any_angle(
+    model_of: Callable[..., Model], amplitude: float
+) -> None:
+    """From 137.8 deg on, where the mean of the directions turns round, both lost a turn.  The stop limits the arm at
+    120 deg; the cage turns by its share."""
+    text = PENDULUM.replace("[run]", TWIST + BEARING + 'outputs = ["*"]')
+    model, most = model_of(text), math.radians(amplitude)
+    run = model.simulate(
+        parameters={"mechanism.driver.swing.amplitude": most}, cycles=1, transient=0, samples_per_cycle=720
+    )
+    turned = most * np.sin(RATE * run.t)
+    np.testing.assert_allclose(
+        run["torsion_spring.twist.torque"], 10.0 * (MEAN + turned - math.radians(50.0)), rtol=1e-12
+    )
+    deep = MEAN + turned - math.radians(120.0)
+    np.testing.assert_allclose(run["torsion_stop.limit.torque"], 400.0 * np.maximum(deep, 0.0), rtol=1e-9, atol=1e-9)
+    rolled = np.unwrap(run["cage.in_outer"], period=2.0 * math.pi)
+    np.testing.assert_allclose(rolled - rolled[0], 0.5 * (1.0 - 8.0 / 40.0) * turned, atol=1e-10)
+
+
+#: A crank-rocker: its driver can turn round.
+CRANKED = (
+    ROCKERS.replace('["100 mm", "0 mm"]', '["120 mm", "0 mm"]').replace("60 mm", "100 mm").replace('B = "80', 'B = "30')
+)
+
+
+@pytest.mark.parametrize("driver", [DRIVER, DRIVER.replace('"40 deg"', '"500 deg"')])
+def test_springs_of_a_crank_rocker_follow_its_bodies_over_any_angle(
+    model_of: Callable[..., Model], driver: str
+) -> None:
+    """The angles of all bodies, unwrapped; the mean of each over a period is within half a turn of the free angle."""
+    free = {"arm": -2.0, "coupler": 4.0, "rocker": -0.7}  # the rocker's mean is half a turn from there, nearly
+    springs = "".join(
+        f'[mechanism.torsion_springs.{body}]\nbodies = ["frame", "{body}"]\nstiffness = "1 N*m/rad"\n'
+        f'free_angle = "{angle} rad"\n'
+        for body, angle in free.items()
+    )
+    text = CRANKED.replace(DRIVER, driver).replace("[run]", f"{springs}[run]")
+    run = model_of(text.replace("outputs = [", 'outputs = ["body.*", "torsion_spring.*", ')).simulate(
+        samples_per_cycle=2880
+    )
+    for body, angle in free.items():
+        excess = np.unwrap(run[f"body.{body}.angle"]) - angle
+        excess -= 2.0 * math.pi * np.round(np.mean(excess[:-1]) / (2.0 * math.pi))
+        np.testing.assert_allclose(run[f"torsion_spring.{body}.torque"], excess, atol=1e-10)
+
+
+def test_a_spring_in_a_linkage_that_cannot_turn_round_follows_its_bodies(model_of: Callable[..., Model]) -> None:
+    """With a table to and fro within the driver's range; the equations of the same machine whose driver swings."""
+    springs = """[mechanism.torsion_springs.at_rocker]
+bodies = ["frame", "rocker"]
+stiffness = "1 N*m/rad"
+free_angle = "80 deg"
+[mechanism.torsion_springs.at_arm]
+bodies = ["arm", "frame"]
+stiffness = "1 N*m/rad"
+free_angle = "-60 deg"
+[run]
+"""
+    table = (
+        'start_angle = "60 deg"\nrange = { start = "20 deg", end = "100 deg" }\n'
+        'table = { time = ["0 s", "0.2 s", "0.6 s", "0.8 s"], speed = ["0 rad/s", "3 rad/s", "-3 rad/s", "0 rad/s"] }'
+    )
+    text = ROCKERS.replace("[run]", springs).replace("outputs = [", 'outputs = ["body.*", "torsion_spring.*", ')
+    run = model_of(
+        text.replace(DRIVER, table).replace("cycles = 1\ntransient_cycles = 0", 'duration = "0.8 s"')
+    ).simulate()
+    assert np.ptp(run["body.arm.angle"]) > 0.5
+    rocker = np.unwrap(run["body.rocker.angle"])
+    np.testing.assert_allclose(run["torsion_spring.at_rocker.torque"], rocker - math.radians(80.0), atol=1e-12)
+    np.testing.assert_allclose(run["torsion_spring.at_arm.torque"], MEAN - run["body.arm.angle"], atol=1e-12)
+
+
+def test_balls_in_a_linkage_that_cannot_turn_round_roll_with_its_bodies(model_of: Callable[..., Model]) -> None:
+    """In the hinge of the rocker: the cage turns by its share of the rocker's angle."""
+    text = ROCKERS.replace("[run]", BEARING.replace('joint = "A"', 'joint = "D"')).replace(
+        DRIVER, 'start_angle = "60 deg"\nspeed = "2 rad/s"'
+    )
+    run = model_of(text.replace('"driver.*", ', '"body.*", "cage.*", ')).simulate(duration=0.2)
+    rocker, cage = (np.unwrap(run[name]) for name in ("body.rocker.angle", "cage.in_outer"))
+    assert np.ptp(rocker) > 0.1
+    np.testing.assert_allclose(cage - cage[0], 0.4 * (rocker - rocker[0]), atol=1e-6)  # the rocker moves in its play

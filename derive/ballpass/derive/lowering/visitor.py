@@ -9,15 +9,17 @@ callback, which answers with a symbol of the derived constants.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import reduce
+from itertools import pairwise
 from operator import add, mul
 
 import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.elements.hertz import ellipticity
-from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
+from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Average, Ideal, Turns, positions_of
 from ballpass.derive.terms import ExpressionError
 from ballpass.derive.variables import DRIVER_ANGLE
 
@@ -255,34 +257,45 @@ class Visitor:
     def _ideal(self, expression: sp.Basic) -> ca.SX:
         """A function of the linkage without play, at angles of the driver that it chooses."""
         closed = positions_of(expression)
+        of = DRIVER_ANGLE if isinstance(expression, Ideal | Average) else expression.args[2]
 
         def at(angle: float | sp.Basic) -> Visitor:
-            if (angle, closed) not in self._ideals:
-                driver = self(angle) if isinstance(angle, sp.Basic) else ca.SX(angle)
-                held = {DRIVER_ANGLE: driver} | {position: ca.SX(0.0) for position in closed}
-                self._ideals[angle, closed] = self.child(held, self._definitions)
-            return self._ideals[angle, closed]
+            if (of, angle, closed) not in self._ideals:
+                held = {of: self(angle)} | {position: ca.SX(0.0) for position in closed}
+                self._ideals[of, angle, closed] = self.child(held, self._definitions)
+            return self._ideals[of, angle, closed]
 
         if isinstance(expression, Ideal):
             return at(expression.args[1])(expression.args[0])
-        period = int(expression.args[2 if isinstance(expression, Turns) else 3])
-        count = period * POINTS
-        angles = [2.0 * ca.pi * k / POINTS for k in range(count)]
-        cos, sin = zip(
-            *((visit(expression.args[0]), visit(expression.args[1])) for visit in map(at, angles)), strict=True
-        )
-        pairs = [(k, (k + 1) % count) for k in range(count)]
+        if isinstance(expression, Average):
+            phases = (2.0 * math.pi * k / POINTS for k in range(POINTS))
+            return ca.SX(reduce(add, (at(phase)(expression.args[0]) for phase in phases)) / POINTS)
+        cos, sin, _, start, period, *others = expression.args
+        count = int(period) * POINTS
+        angles = [start + 2.0 * math.pi * k / POINTS for k in range(count)]
+        seen = [(visit(cos), visit(sin)) for visit in map(at, angles)]
         if isinstance(expression, Turns):
-            turned = [ca.atan2(cos[i] * sin[j] - sin[i] * cos[j], cos[i] * cos[j] + sin[i] * sin[j]) for i, j in pairs]
-            whole = ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5) / period
-            most = reduce(ca.fmax, (ca.fabs(step) for step in turned))
-            return ca.SX(ca.if_else(most < FARTHEST, whole, ca.inf))
-        turns = self(expression.args[2])
-        rest = [(ca.cos(turns * a), ca.sin(turns * a)) for a in angles]
-        across = reduce(add, (s * c0 - c * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
-        along = reduce(add, (c * c0 + s * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
+            steps = [_angle_between(one, other) for one, other in pairwise([*seen, seen[0]])]
+            total, most = reduce(add, steps), reduce(ca.fmax, map(ca.fabs, steps))
+            whole = ca.floor(total / (2.0 * ca.pi) + 0.5) / int(period)
+            return ca.SX(ca.if_else(_is_number(total), ca.if_else(most < FARTHEST, whole, ca.inf), 0.0))
+        turned = [self(others[0] * angle) for angle in angles]
+        rest = [
+            (c * ca.cos(a) + s * ca.sin(a), s * ca.cos(a) - c * ca.sin(a))
+            for (c, s), a in zip(seen, turned, strict=True)
+        ]
+        first = ca.atan2(rest[0][1], rest[0][0])
+        total, known, locks = first, ca.SX(1.0), ca.SX(1.0)
+        for way in (rest, [rest[0], *rest[:0:-1]]):  # back from the start as well where the way on locks
+            angle, valid = first, locks
+            for one, other in pairwise(way):
+                step = _angle_between(one, other)
+                valid = valid * _is_number(step)
+                angle = angle + ca.if_else(valid, step, 0.0)
+                total, known = total + ca.if_else(valid, angle, 0.0), known + valid
+            locks = 1 - valid
         # a step function: no derivative follows a number that cancels
-        return ca.SX(ca.floor(ca.atan2(across, along) * STEPS_A_RADIAN + 0.5) / STEPS_A_RADIAN)
+        return ca.SX(ca.floor(total / known * STEPS_A_RADIAN + 0.5) / STEPS_A_RADIAN)
 
     def _elliptic(self, expression: sp.Basic) -> ca.SX:
         (m,) = expression.args
@@ -290,6 +303,16 @@ class Visitor:
             self._agm[m] = _complete_elliptic(ca.sqrt(1 - self(m)))
         first, second = self._agm[m]
         return first if isinstance(expression, sp.elliptic_k) else second
+
+
+def _angle_between(one: tuple[ca.SX, ca.SX], other: tuple[ca.SX, ca.SX]) -> ca.SX:
+    """From one direction, cosine and sine, to another [rad]."""
+    return ca.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])
+
+
+def _is_number(angle: ca.SX) -> ca.SX:
+    """1 where it is none of a linkage that cannot be assembled, else 0."""
+    return ca.fabs(angle) < ca.inf
 
 
 def _is_trivial(expression: sp.Basic) -> bool:

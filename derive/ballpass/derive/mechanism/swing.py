@@ -3,9 +3,11 @@
 In: a linkage and one of its bodies.  Out: the angle as whole turns with the driver, a mean direction, and a swing about
 both.
 
-The pose gives cosine and sine of an angle.  In a turn of the driver the body makes N whole turns, and swings by less
-than half a turn about N theta + m; so the angle is N theta + m + atan2(sine, cosine of the rest), without a jump.  N
-and m follow from the ideal linkage, at `POINTS` angles of a turn; the result does not depend on m.
+The pose gives cosine and sine of an angle.  In a turn of the driven body the body makes N whole turns, and swings by
+less than half a turn about N theta + m; so the angle is N theta + m + atan2(sine, cosine of the rest), without a jump.
+N and m follow from the ideal linkage, at `POINTS` angles of a turn; the result does not depend on m.  Where the linkage
+locks within a turn N is zero, and m that of the angles around the start.  A driver that swings makes no turn, and N
+theta is then part of the swing.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ import sympy as sp
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.terms import Definition
-from ballpass.derive.variables import DRIVER_ANGLE, Terms
+from ballpass.derive.terms import Definition, symbol_of
+from ballpass.derive.variables import Terms
 
 #: Angles of the driver at which the ideal linkage is evaluated.
 POINTS = 48
@@ -35,22 +37,28 @@ class Ideal(sp.Function):  # type: ignore[misc]
     """
 
 
+class Average(sp.Function):  # type: ignore[misc]
+    """``Average(angle, *positions)``: of a defined angle over a period of the driver's swing, joints without play."""
+
+
 class Turns(sp.Function):  # type: ignore[misc]
-    """``Turns(cos, sin, period, *positions)``: turns of a direction in a turn of the driver, whole ones in a `period`
-    of so many turns; infinite where it turns by more than `FARTHEST` between neighbours."""
+    """``Turns(cos, sin, angle, start, period, *positions)``: turns of a direction in a turn of an angle from its start
+    on, whole ones in a `period` of so many turns; zero where the linkage locks in between, infinite where it turns by
+    more than `FARTHEST` between neighbours."""
 
 
 class Mean(sp.Function):  # type: ignore[misc]
-    """``Mean(cos, sin, turns, period, *positions)``: mean direction over a period, less the turns, rounded [rad]."""
+    """``Mean(cos, sin, angle, start, period, turns, *positions)``: mean angle of a direction less its turns over a
+    period, followed from the start on as far as the linkage does not lock, rounded [rad]."""
 
 
 #: Functions of the linkage without play: constants of a run.
-OF_IDEAL_LINKAGE = (Ideal, Turns, Mean)
+OF_IDEAL_LINKAGE = (Ideal, Average, Turns, Mean)
 
 
 def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
     """The coordinates that are zero in a function of the ideal linkage."""
-    return tuple(function.args[{Ideal: 2, Turns: 3, Mean: 4}[function.func] :])
+    return tuple(function.args[{Ideal: 2, Average: 1, Turns: 5, Mean: 6}[function.func] :])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,42 +89,47 @@ def with_driver(drive: Drive) -> Swing:
     return Swing(turns=sp.S.One, rate=drive.speed)
 
 
+def followed(linkage: Linkage, cos: sp.Expr, sin: sp.Expr, turns: sp.Symbol, mean: sp.Symbol) -> tuple[sp.Expr, ...]:
+    """What `turns` and `mean` of a direction are, and its angle less these turns of the driven body [rad]."""
+    angle, start = linkage.drive.driven[0], symbol_of(linkage.mechanism.driver.start_angle)
+    swept, known = (cos, sin, angle, start, linkage.turns), turns * angle + mean
+    ahead, across = sp.cos(known), sp.sin(known)
+    rest = mean + sp.atan2(sin * ahead - cos * across, cos * ahead + sin * across)
+    return Turns(*swept, *linkage.positions), Mean(*swept, turns, *linkage.positions), rest
+
+
 def swing_of(linkage: Linkage, body: str) -> Swing:
     """Angle of a body of a linkage, or of its frame."""
-    if body == linkage.driven and linkage.drive.swings is None:
-        return with_driver(linkage.drive)
-    pose, positions, period = linkage.pose(body), linkage.positions, linkage.turns
+    drive, pose = linkage.drive, linkage.pose(body)
+    if body == linkage.driven and drive.swings is None:
+        return with_driver(drive)
     if sp.sympify(pose.cos).is_number:
         return STILL
-    if pose.angle is not None and linkage.drive.swings is None:  # in proportion to the driver's
-        return Swing(turns=sp.diff(pose.angle, linkage.drive.angle), rate=pose.rate)
-    mark, start = subscript(body), linkage.drive.first_angle
+    if pose.angle is not None and drive.swings is None:  # in proportion to the driver's
+        return Swing(turns=sp.diff(pose.angle, drive.angle), rate=pose.rate)
+    mark = subscript(body)
     turns, mean, swing, at_start = (
         sp.Symbol(f"body.{body}.{name}", real=True) for name in ("turns", "mean_angle", "swing", "swing_at_start")
     )
-    known = turns * DRIVER_ANGLE + mean
-    cos, sin = sp.cos(known), sp.sin(known)
-    constants = (
+    whole, middle, rest = followed(linkage, pose.cos, pose.sin, turns, mean)
+    constants = [
+        (turns, whole, "1", f"Turns of the {body} in a turn of the driver", "N"),
+        (mean, middle, "rad", f"Mean of the rest of the {body}'s angle", "m"),
         (
-            turns,
-            Turns(pose.cos, pose.sin, period, *positions),
-            "1",
-            f"Turns of the {body} in a turn of the driver",
-            "N",
-        ),
-        (
-            mean,
-            Mean(pose.cos, pose.sin, turns, period, *positions),
+            at_start,
+            Ideal(swing, drive.first_angle, *linkage.positions),
             "rad",
-            f"Mean of the rest of the {body}'s angle",
-            "m",
+            f"Swing of the {body} at the start, ideal",
+            "s^0",
         ),
-        (at_start, Ideal(swing, start, *positions), "rad", f"Swing of the {body} at the start, ideal", "s^0"),
-    )
-    rest = mean + sp.atan2(pose.sin * cos - pose.cos * sin, pose.cos * cos + pose.sin * sin)
+    ]
     words = f"Angle of the {body} less its whole turns with the driver"
+    if drive.swings is not None:
+        rest, words = turns * drive.driven[0] + rest, f"Angle of the {body}"
+    if pose.angle is not None:
+        rest, constants = pose.angle, constants[2:]
     return Swing(
-        turns=turns,
+        turns=turns if drive.swings is None else sp.S.Zero,
         swing=swing,
         at_start=at_start,
         rate=pose.rate,

@@ -213,12 +213,6 @@ def check_assembly(model: LoadedModel, numbers: Numbers, end: float = math.inf) 
     for constant in () if np.isfinite(numbers.c).all() else manifest.constants:
         if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
             body = constant.name.removeprefix("body.").removesuffix(".turns")
-            if ends is not None:
-                raise RequestError(
-                    f"The {body} carries a bearing, whose balls are followed over whole turns of the driver, and the "
-                    f"driver cannot make one: {ends[1].words(start, what)} Change the lengths of the bodies that meet "
-                    "there, or drive by mechanism.driver.swing."
-                )
             raise RequestError(
                 f"The angle of {body} changes by more than three eighths of a turn while the driver turns by 7.5 "
                 "degrees: which way round is unknown. Change lengths so that no joint passes another so near."
