@@ -54,11 +54,16 @@ class States:
     def drawn(self, rng: np.random.Generator) -> tuple[float, Values]:
         """A time of the first turns, and a state in which some balls are loaded."""
         driver = self.tables.get("shaft") or self.tables["mechanism"]["driver"]
-        speed = driver["speed"] if "speed" in driver else driver["table"]["speed"][0]
-        start = amount(driver.get("start_angle", 0.0))
-        return float(rng.uniform(0, 2)) * math.tau / abs(amount(speed)), {
-            name: float(self._drawn(rng, name, start)) for name in self.states
-        }
+        start, turns = amount(driver.get("start_angle", 0.0)), float(rng.uniform(0, 2))
+        state = {name: float(self._drawn(rng, name, start)) for name in self.states}
+        if "swing" in driver:
+            return turns / amount(driver["swing"]["frequency"]), state
+        speed = amount(driver["speed"] if "speed" in driver else driver["table"]["speed"][0])
+        if "range" in driver:
+            low, high = (amount(driver["range"][end]) for end in ("start", "end"))
+            turns *= 0.5 * ((high if speed > 0 else low) - start) / math.copysign(math.tau, speed)
+            state |= {"driver.angle": float(rng.uniform(low, high))} if "driver.angle" in state else {}
+        return turns * math.tau / abs(speed), state
 
     @staticmethod
     def _drawn(rng: np.random.Generator, name: str, start: float) -> float:

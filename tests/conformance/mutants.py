@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from generator import Tables, amount, quantity
 from one_machine import LENGTH, MASS, TIME, scaled
-from reference import vector
+from reference import Reference, vector
 
 TURN = math.tau
 Values = Mapping[str, Any]
@@ -165,6 +165,8 @@ def _named(tables: Tables) -> Callable[[Values], dict[str, Any]]:
 
 def bearing_twice(tables: Tables) -> Mutant | None:
     """Loaded one-way each carries its share; of those coupled two-way two single ones take the place of a pair."""
+    if any("position" in one for one in bearings(tables).values()):  # the shaft parts its loads
+        return None
     both = [p for p, one in bearings(tables).items() if one.get("coupling") != "two-way" or one.get("count") == 2]
     if not both:
         return None
@@ -186,7 +188,7 @@ def bearing_twice(tables: Tables) -> Mutant | None:
 
 
 def bearing_that_carries_nothing(tables: Tables) -> Mutant | None:
-    if not bearings(tables):
+    if not bearings(tables) or any("position" in one for one in bearings(tables).values()):
         return None
     moved = _named(tables)
     first = next(iter(tables["bearings"].values()))
@@ -306,7 +308,14 @@ def frame_turned(tables: Tables, by: float = 0.7) -> Mutant:
             mechanism["gravity"] = around(mechanism["gravity"], "m/s^2", (0.0, -1.0))
         points = mechanism["frame"]["points"]
         points |= {name: around(place, "m") for name, place in points.items()}
-        mechanism["driver"]["start_angle"] = plus(mechanism["driver"].get("start_angle", "0.0 rad"), by)
+        driver, over = mechanism["driver"], 0.0 if "swing" in mechanism["driver"] else by  # its phase
+        driver["start_angle"] = plus(driver.get("start_angle", "0.0 rad"), by)
+        if "range" in driver:
+            driver["range"] = {end: plus(one, by) for end, one in driver["range"].items()}
+        for gear in mechanism.get("gears", {}).values():
+            arm, _ = Reference.axes(mechanism, gear)
+            for key, wheel in zip(("first_angle", "second_angle"), gear["bodies"], strict=True):
+                gear[key] = plus(gear.get(key, "0.0 rad"), by * ((arm in standing) - (wheel in standing)))
         entries = [*mechanism["joints"].values(), *mechanism.get("stops", {}).values()]
         for entry in (one for one in entries if "direction" in one and one["bodies"][0] in standing):
             entry["direction"] = plus(entry["direction"], by)
@@ -320,9 +329,9 @@ def frame_turned(tables: Tables, by: float = 0.7) -> Mutant:
             if "direction" in entry:
                 entry["direction"] = plus(entry["direction"], by)
             if "table" in entry:
-                entry["table"]["angle"] = [plus(one, by) for one in entry["table"]["angle"]]
-        for window in windows(tables):
-            window |= {edge: plus(window[edge], by) for edge in ("start", "end")}
+                entry["table"]["angle"] = [plus(one, over) for one in entry["table"]["angle"]]
+    for window in windows(tables):
+        window |= {edge: plus(window[edge], by if mechanism is None else over) for edge in ("start", "end")}
     for load in loads(tables):
         load |= {key: around(load[key], "N") for key in ("force", "mean") if key in load}
         if load["type"] == "unbalance":
@@ -337,6 +346,8 @@ def frame_turned(tables: Tables, by: float = 0.7) -> Mutant:
             load |= {"amplitude": _pair(map(abs, pair), "N"), "phase": _pair(map(cmath.phase, pair), "rad")}
     for one in bearings(tables).values():
         one["ball_angle"] = plus(one["ball_angle"], by)
+        if "offset" in one:
+            one["offset"] = around(one["offset"], "m")
         for ring in ("outer", "inner"):
             for order, wave in one.get(f"{ring}_waviness", {}).items():
                 wave["phase"] = plus(wave["phase"], -int(order) * by)
@@ -344,12 +355,15 @@ def frame_turned(tables: Tables, by: float = 0.7) -> Mutant:
             if spall["on"] != "ball":
                 spall["angle"] = plus(spall["angle"], by)
 
+    if mechanism is not None and "swing" in mechanism["driver"]:
+        standing.add("drive_angle")
+
     def moved(values: Values) -> dict[str, Any]:
         out = dict(values)
         for name in values:
             if name.endswith("x") and (other := f"{name[:-1]}y") in values:
                 out[name], out[other] = turned(values[name], values[other])
-            elif _is_angle(name) and name.split(".")[1:2] not in [[one] for one in standing]:
+            elif _is_angle(name) and not standing & {*name.split(".")[:2]}:
                 out[name] = values[name] + by
         return out
 
@@ -360,8 +374,10 @@ def _is_angle(name: str) -> bool:
     return bool(re.fullmatch(r"driver\.angle|drive_angle|body\..*\.angle|(.*\.)?cage\.in_.*", name))
 
 
-def frame_mirrored(tables: Tables) -> Mutant:
-    """y, angles and turns have the other sign."""
+def frame_mirrored(tables: Tables) -> Mutant | None:
+    """y, angles and turns have the other sign; a driver cannot swing backwards first."""
+    if "swing" in tables.get("mechanism", {}).get("driver", {}):
+        return None
 
     def across(place: Any, unit: str, axis: tuple[float, float] = (1.0, 0.0)) -> Any:
         return _pair(vector(place, axis) * [1.0, -1.0], unit) if place != "origin" else place
@@ -387,6 +403,10 @@ def frame_mirrored(tables: Tables) -> Mutant:
         driver = mechanism["driver"]
         negate(driver, "speed", "start_angle")
         negate(driver.get("table", {}), "speed")
+        if "range" in driver:
+            driver["range"] = {"start": minus(driver["range"]["end"]), "end": minus(driver["range"]["start"])}
+        for gear in mechanism.get("gears", {}).values():
+            negate(gear, "first_angle", "second_angle")
         motor = driver.get("torque", {})
         if motor.get("law") == "table":
             backwards(motor, "speed", "torque")
@@ -412,7 +432,7 @@ def frame_mirrored(tables: Tables) -> Mutant:
             if "force" in entry:
                 entry["force"] = across(entry["force"], "N")
             negate(entry, "torque", "direction")
-    negate(tables.get("shaft", {}), "speed")
+    negate(tables.get("shaft", {}), "speed", "outer_speed")
     for load in loads(tables):
         load |= {key: across(load[key], "N") for key in ("force", "mean", "amplitude") if key in load}
         if load["type"] == "table":
@@ -422,6 +442,7 @@ def frame_mirrored(tables: Tables) -> Mutant:
     several = bearings(tables)
     for one in several.values():
         negate(one, "ball_angle")
+        one |= {"offset": across(one["offset"], "m")} if "offset" in one else {}
         for waves in (
             one.get("outer_waviness", {}),
             one.get("inner_waviness", {}),

@@ -8,14 +8,18 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
 from coupled_scenes import linkage_text
+from linkages import GEARED
 from random_machines import random_linkage
 
 Tables = dict[str, Any]
 KINDS = ("shaft", "one-way", "two-way", "motor", "linkage", "crank")
+#: From a seed on: gears and belts, drivers that swing or have a range, shafts of which both rings turn or that tilt.
+FURTHER, FIRST = ("gears", "swing", "range", "rings", "tilting"), 300
 
 
 def amount(text: object) -> float:
@@ -85,8 +89,9 @@ class Draw:
 
 def scene(seed: int) -> Tables:
     """Tables of the scene of a seed."""
-    draw, kind = Draw(seed), KINDS[seed % len(KINDS)]
-    made = _shaft(draw) if kind == "shaft" else _crank(draw) if kind == "crank" else _machine(draw, kind)
+    draw, kinds = Draw(seed), KINDS if seed < FIRST else FURTHER
+    kind = kinds[seed % len(kinds)]
+    made = _MADE.get(kind, _machine)(draw, kind)
     return {"title": f"random scene {seed}, {kind}", **made, "run": {"cycles": 1, "outputs": ["*"]}}
 
 
@@ -205,7 +210,7 @@ def _effects(draw: Draw, count: int, room: float) -> Tables:
 # shafts
 
 
-def _shaft(draw: Draw) -> Tables:
+def _shaft(draw: Draw, kind: str) -> Tables:
     speed = draw.number(20, 200) * draw.one([1, -1])
     shaft: Tables = {"speed": quantity(speed, "rad/s")} | ({"ring": "outer"} if draw.chance(0.3) else {})
     kinds = _SHAFT_LOADS[: -1 if "ring" in shaft else None]  # an unbalance turns with the inner ring
@@ -214,6 +219,41 @@ def _shaft(draw: Draw) -> Tables:
     bearings = [bearing(draw, "shaft") | ({"share": draw.number(0.2, 1)} if draw.chance(0.4) else {}) for _ in names]
     where = {"bearing": bearings[0]} if names == [""] else {"bearings": dict(zip(names, bearings, strict=True))}
     return {"shaft": shaft, "loads": loads, **where}
+
+
+def _rings(draw: Draw, kind: str) -> Tables:
+    """Both rings turn, the outer one in either sense and at any speed."""
+    made = _shaft(draw, kind)
+    made["shaft"].pop("ring", None)
+    made["shaft"]["outer_speed"] = draw.of("rad/s", -200, 200)
+    return made
+
+
+def _tilting(draw: Draw, kind: str) -> Tables:
+    """A rigid shaft in two or three bearings, loads at places along it; or levers alone in two."""
+    made, tilts = _shaft(draw, kind), draw.chance(0.8)
+    made.pop("bearing", None)
+    names = ("left", "right", "middle")[: 3 if tilts and draw.chance(0.4) else 2]
+    made["bearings"] = {}
+    for name, place in zip(names, draw.rng.permutation([-0.08, 0.07, 0.01]), strict=False):
+        one = bearing(draw, "shaft") | {"position": draw.of("m", place - 0.02, place + 0.02)}
+        if tilts:
+            one["inner_ring"] = {key: value for key, value in one["inner_ring"].items() if key == "damping"}
+            if draw.chance(0.6):
+                one["offset"] = draw.vector("m", 1e-5)
+        made["bearings"][name] = one
+    for load in made["loads"].values():
+        if draw.chance(0.8):
+            load["position"] = draw.of("m", -0.1, 0.1)
+    if tilts:
+        made["shaft"] |= {"mass": draw.of("kg", 1, 6), "transverse_inertia": draw.of("kg*m^2", 5e-3, 5e-2)}
+        if draw.chance(0.7):
+            made["shaft"]["polar_inertia"] = draw.of("kg*m^2", 1e-3, 2e-2)
+        if draw.chance(0.7):
+            made["shaft"]["center_of_mass"] = draw.of("m", -0.03, 0.03)
+        if draw.chance(0.3) and "ring" not in made["shaft"]:
+            made["shaft"]["outer_speed"] = draw.of("rad/s", -200, 200)
+    return made
 
 
 _SHAFT_LOADS = ("constant", "constant", "harmonic", "rows over time", "rows over angles", "unbalance")
@@ -248,7 +288,7 @@ def _load(draw: Draw, kind: str, speed: float) -> Tables:
 # linkages
 
 
-def _crank(draw: Draw) -> Tables:
+def _crank(draw: Draw, kind: str) -> Tables:
     """A crank alone whose bearing carries all of it: one-way and two-way are the same machine."""
     mass, pin = draw.of("kg", 0.4, 2), quantity(8e-3, "m")
     bodies = {
@@ -289,37 +329,161 @@ def _machine(draw: Draw, kind: str) -> Tables:
         mechanism["driver"]["torque"] = _motor(draw, speed)
     elif draw.chance(0.25):
         mechanism["driver"] |= {"table": _speeds(draw, amount(mechanism["driver"].pop("speed")))}
-    if draw.chance(0.5) and ("torque" in mechanism["driver"] or "table" in mechanism["driver"]):
-        mechanism["driver"]["flywheel"] = {"inertia": draw.of("kg*m^2", 0.01, 0.3)}
-    start = amount(mechanism["driver"].get("start_angle", 0.0))
+    _add_loads(draw, mechanism)
+    out: Tables = {"mechanism": mechanism}
+    if kind == "linkage":
+        return out
+    if kind == "one-way":
+        return out | _one_way(draw, mechanism, mechanism["driver"]["joint"], speed)
+    return out | _two_way(draw, mechanism, [])
+
+
+def _add_loads(draw: Draw, mechanism: Tables) -> None:
+    """A flywheel, other forces and torques in place of those of the linkage, springs, stops, friction."""
+    driver = mechanism["driver"]
+    if draw.chance(0.5) and {"torque", "table", "swing"} & {*driver}:
+        driver["flywheel"] = {"inertia": draw.of("kg*m^2", 0.01, 0.3)}
+    start = 0.0 if "swing" in driver else amount(driver.get("start_angle", 0.0))
     for table in ("forces", "torques"):
         for force in mechanism.get(table, {}).values():
             name, unit = ("force", "N") if table == "forces" else ("torque", "N*m")
             force.pop(name)
             force |= _amount_of(draw, name, unit, 300 if unit == "N" else 2, [start])
     _add_forces(draw, mechanism)
-    out: Tables = {"mechanism": mechanism}
-    if kind == "linkage":
-        return out
-    if kind == "one-way":
-        out["bearing"] = {"joint": mechanism["driver"]["joint"], "share": draw.number(0.3, 1.0), **bearing(draw, kind)}
-        if draw.chance(0.5):
-            out["loads"] = {"own": _load(draw, draw.one(["constant", "harmonic", "rows over time"]), speed)}
-            out["loads"]["own"].pop("window", None)
-        return out
-    hinges = [name for name, joint in mechanism["joints"].items() if joint["type"] == "revolute"]
+
+
+def _one_way(draw: Draw, mechanism: Tables, joint: str, speed: float) -> Tables:
+    """At the driver's joint or a wheel's; the mass of a ring by Eq. (3) is for cranks with two joints."""
+    out: Tables = {"bearing": {"joint": joint, "share": draw.number(0.3, 1.0), **bearing(draw, "one-way")}}
+    turning = next(body for body in mechanism["joints"][joint]["bodies"] if body != "frame")
+    ring, held = out["bearing"]["inner_ring"], [j for j in mechanism["joints"].values() if turning in j["bodies"]]
+    if "equivalent_mass" in ring and (joint != mechanism["driver"]["joint"] or len(held) != 2):
+        ring |= {"mass": ring.pop("equivalent_mass")["ring"]}
+    if draw.chance(0.5):
+        out["loads"] = {"own": _load(draw, draw.one(["constant", "harmonic", "rows over time"]), speed)}
+        out["loads"]["own"].pop("window", None)
+    return out
+
+
+def _two_way(draw: Draw, mechanism: Tables, rigid: Sequence[str]) -> Tables:
+    """In some of the hinges but those that may have no play."""
+    joints = mechanism["joints"].items()
+    hinges = [name for name, joint in joints if joint["type"] == "revolute" and name not in rigid]
     chosen = [name for name in hinges if draw.chance(0.35)] or [draw.one(hinges)]
     if draw.chance(0.2):
         chosen.append(chosen[0])
     bearings = {}
     for k, joint in enumerate(chosen):
-        one = {"joint": joint, "coupling": "two-way", **bearing(draw, kind)}
+        one = {"joint": joint, "coupling": "two-way", **bearing(draw, "two-way")}
         one |= {"count": draw.whole(1, 2)}
         bearings[f"b{k}"] = one
         one["inner_ring"] = {"body": draw.one(mechanism["joints"][joint]["bodies"])}
         if joint == chosen[0]:
             one["inner_ring"] = bearings["b0"]["inner_ring"]
-    return out | ({"bearing": bearings["b0"]} if len(bearings) == 1 and draw.chance(0.5) else {"bearings": bearings})
+    return {"bearing": bearings["b0"]} if len(bearings) == 1 and draw.chance(0.5) else {"bearings": bearings}
+
+
+def _geared(draw: Draw, kind: str) -> Tables:
+    """Wheels and belts on the frame and on an arm, of other ratios, any drive, bearings at wheels or elsewhere."""
+    name = draw.one(list(GEARED))
+    mechanism = tomllib.loads(linkage_text(GEARED[name]()))["mechanism"]
+    driver, speed = mechanism["driver"], draw.number(15, 60) * draw.one([1, -1])
+    driver |= {"speed": quantity(speed, "rad/s"), "start_angle": draw.of("rad", -3, 3)}
+    mechanism["frame"]["points"]["hook"] = draw.vector("m", 0.5)
+    for gear in mechanism["gears"].values():
+        gear["type"] = draw.one(["external", "internal", "belt"])
+        gear["teeth"] = draw.one([[20, 40], [45, 30], [18, 54], [24, 36], [48, 36], [25, 50], [60, 20]])
+        gear.pop("radius", None)
+        gear.pop("pressure_angle", None)
+        if gear["type"] == "belt":
+            gear["radius"] = quantity(draw.number(0.002, 0.015) * min(1.0, gear["teeth"][0] / gear["teeth"][1]), "m")
+        elif draw.chance(0.5):
+            gear["pressure_angle"] = draw.of("rad", 0, 0.5)
+        if name != "sector":  # whose wheel is on a rocker, and within half a turn of its angle
+            gear |= {key: draw.of("rad", -3, 3) for key in ("first_angle", "second_angle")}
+    _other_drive(draw, mechanism, speed)
+    _add_loads(draw, mechanism)
+    out: Tables = {"mechanism": mechanism}
+    if draw.chance(0.3):
+        return out
+    hinges = {*mechanism["joints"]} & {"A", "E", "I", "S", "P", "F"}  # they hold axes, most of them on the frame
+    if {"torque", "swing"} & {*driver} or draw.chance(0.4):
+        return out | _two_way(draw, mechanism, [*hinges, *(["D"] if name == "sector" else [])])
+    held = [one for one in sorted(hinges) if "frame" in mechanism["joints"][one]["bodies"]]
+    out |= _one_way(draw, mechanism, draw.one(held), speed)
+    if out["bearing"]["joint"] != driver["joint"]:
+        out.pop("loads", None)
+    return out
+
+
+def _other_drive(draw: Draw, mechanism: Tables, speed: float) -> None:
+    """In place of a constant speed: a motor, a table or a swing, or neither."""
+    driver, drive = mechanism["driver"], draw.one(["speed", "table", "torque", "swing"])
+    if drive == "torque":
+        driver["torque"] = _motor(draw, speed)
+    elif drive != "speed":
+        driver.pop("speed")
+        driver[drive] = _speeds(draw, speed) if drive == "table" else _swing(draw, 0.3, 9.0)
+
+
+def _swing(draw: Draw, least: float, most: float) -> Tables:
+    amplitude = quantity(draw.size(least, most), "rad")
+    return {"amplitude": amplitude, "frequency": draw.of("Hz", 1, 6)}
+
+
+#: A double rocker, whose driver may turn from 0 to 101 degrees.
+ROCKERS = {
+    "frame": {"points": {"A": "origin", "D": ["0.1 m", "0 m"]}},
+    "bodies": {
+        "arm": {"points": {"A": "origin", "B": "0.08 m"}},
+        "coupler": {"points": {"B": "origin", "C": "0.06 m"}},
+        "rocker": {"points": {"D": "origin", "C": "0.08 m"}},
+    },
+    "joints": {
+        "A": {"type": "revolute", "bodies": ["frame", "arm"]},
+        "B": {"type": "revolute", "bodies": ["arm", "coupler"]},
+        "C": {"type": "revolute", "bodies": ["coupler", "rocker"], "branch": "left"},
+        "D": {"type": "revolute", "bodies": ["frame", "rocker"]},
+    },
+}
+
+
+def _limited(draw: Draw, kind: str) -> Tables:
+    """A driver that swings or has a range, of a linkage that can turn round or of a double rocker."""
+    locks = draw.chance(0.4)
+    if locks:
+        mechanism = deepcopy(ROCKERS) | {"driver": {"joint": "A"}, "gravity": draw.vector("m/s^2", 10)}
+        for body in mechanism["bodies"].values():
+            body |= {"mass": draw.of("kg", 0.2, 1), "inertia": draw.of("kg*m^2", 1e-4, 1e-3)}
+            body["center_of_mass"] = draw.vector("m", 0.03)
+        mechanism["forces"] = {"push": {"body": "rocker", "point": "C", "force": ["1 N", "0 N"]}}
+    else:
+        mechanism = tomllib.loads(linkage_text(random_linkage(draw.rng, draw.whole(0, 999))))["mechanism"]
+    mechanism["frame"]["points"]["hook"] = draw.vector("m", 0.5)
+    driver, speed = mechanism["driver"], draw.number(2, 30) * draw.one([1, -1])
+    driver.pop("speed", None)
+    low, high = (draw.number(0.2, 0.5), draw.number(1.2, 1.6)) if locks else (draw.number(-3, 0), draw.number(0.5, 3))
+    if kind == "swing":
+        driver["start_angle"] = quantity(0.5 * (low + high), "rad")
+        driver["swing"] = _swing(draw, 0.05 if locks else 0.2, 0.5 * (high - low) if locks else 12.0)
+    else:
+        driver["range"] = {"start": quantity(low, "rad"), "end": quantity(high, "rad")}
+        driver["start_angle"] = quantity(low + (high - low) * (0.1 if speed > 0 else 0.9), "rad")
+        driver["speed"] = quantity(speed, "rad/s")
+        if draw.chance(0.5):
+            driver["torque"] = _motor(draw, speed)
+    _add_loads(draw, mechanism)
+    out: Tables = {"mechanism": mechanism}
+    if draw.chance(0.4):
+        return out
+    if kind == "range" and "torque" not in driver and draw.chance(0.3):
+        return out | _one_way(draw, mechanism, driver["joint"], speed)
+    return out | _two_way(draw, mechanism, [])
+
+
+#: By kind; linkages that turn round are the others.
+_MADE = {"shaft": _shaft, "crank": _crank, "gears": _geared, "rings": _rings, "tilting": _tilting}
+_MADE |= {"swing": _limited, "range": _limited}
 
 
 def _motor(draw: Draw, speed: float) -> Tables:

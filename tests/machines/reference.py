@@ -7,7 +7,7 @@ an angle, elastic outer rings of bearings coupled two-way x and y; joints and a 
 accelerations and reactions come from one linear system.  Balls are forces between points.
 
 Not covered (`missing` says so): fits, lubrication and other settings of ratings, designations, columns of files,
-jitter, roughness, rollers without a given stiffness.  Of gears external ones on the frame are.
+jitter, roughness, rollers without a given stiffness, tilting shafts of mechanisms.
 """
 
 from __future__ import annotations
@@ -285,7 +285,6 @@ class Reference:
             elastic = [one.name for one in self.bearings if one.elastic]
             self.rings = {name: 3 * len(self.bodies) + 2 * k for k, name in enumerate(elastic)}
         self.gears = self.mechanism.get("gears", {})
-        assert all(gear.get("type", "external") == "external" for gear in self.gears.values())  # on the frame
         self.size = 3 * len(self.bodies) + 2 * len(self.rings)
         self.driver = self.mechanism["driver"]
         self.driven = next(b for b in self.joints[self.driver["joint"]]["bodies"] if b != "frame")
@@ -293,6 +292,15 @@ class Reference:
         self.at_joint: dict[str, list[Bearing]] = {}
         for one in self.bearings if self.two_way else ():
             self.at_joint.setdefault(one.data["joint"], []).append(one)
+        self.exact = {"frame": 0.0, self.driven: 1.0}  # turns of bodies in proportion to the driver's
+        for _ in self.gears:
+            for gear in self.gears.values():
+                (one, two), ratio = gear["bodies"], self._ratio(gear)
+                arm = self.exact.get(self.axes(self.mechanism, gear)[0])
+                if arm is not None and one in self.exact:
+                    self.exact[two] = arm + ratio * (self.exact[one] - arm)
+                elif arm is not None and two in self.exact:
+                    self.exact[one] = arm + (self.exact[two] - arm) / ratio
         self.first_pose = self._assembled()
         self._poses = [(self.start, self.first_pose)]  # of the ideal linkage, known so far
         self._means: dict[tuple[str, str], float | None] = {}
@@ -381,30 +389,83 @@ class Reference:
             rest.append(-normal @ left - 2 * turning * sideways @ (jacobian @ v) + turning**2 * normal @ apart)
             rest.append(0.0)
         for name, gear in self.gears.items():  # the wheels' angles; where their teeth push, see `_teeth`
-            (one, two), ratio = gear["bodies"], -gear["teeth"][0] / gear["teeth"][1]
+            (one, two), ratio, arm = gear["bodies"], self._ratio(gear), self.axes(self.mechanism, gear)[0]
             begins = (number(gear.get(f"{which}_angle", 0.0)) for which in ("first", "second"))
-            turned = [self.angle(body, q) - begin for body, begin in zip((one, two), begins, strict=True)]
+            turned = [
+                self.angle(body, q) - self.angle(arm, q) - begin for body, begin in zip((one, two), begins, strict=True)
+            ]
             where[name] = len(rows)
             residuals.append(turned[1] - ratio * turned[0])
-            rows.append(self.row(two) - ratio * self.row(one))
+            rows.append(self.row(two) - ratio * self.row(one) - (1 - ratio) * self.row(arm))
             rest.append(0.0)
         return np.array(residuals), np.array(rows), np.array(rest), where
 
-    def _teeth(self, name: str, torque: float) -> tuple[Array, float, dict[str, str]]:
-        """Force of the second wheel on the first, its size along the line of pressure, and the wheels' hinges.
+    @staticmethod
+    def _ratio(gear: Tables) -> float:
+        """Turns of the second wheel for one of the first, seen from the body that carries both."""
+        return float(
+            (-1.0 if gear.get("type", "external") == "external" else 1.0) * gear["teeth"][0] / gear["teeth"][1]
+        )
 
-        The multiplier is the torque of the teeth on the second wheel.
+    @staticmethod
+    def axes(mechanism: Tables, gear: Tables) -> tuple[str, list[tuple[str, list[tuple[str, str]]]]]:
+        """The body that carries both axes; of each its point there, and the hinges by which the wheel pushes it.
+
+        A hinge comes with the body that pushes the other one: the wheel, and where it is hinged to a third body at a
+        hinge of the carrier that body.
         """
-        gear = self.gears[name]
-        hinges, axes = {}, []
-        for body in gear["bodies"]:
-            hinge, joint = next((n, j) for n, j in self.joints.items() if {*j["bodies"]} == {"frame", body})
-            hinges[hinge] = body
-            axes.append(self.arm("frame", joint.get("points", (hinge, hinge))[joint["bodies"].index("frame")]))
-        along, teeth = axes[1] - axes[0], gear["teeth"]
-        size = torque / (np.linalg.norm(along) * teeth[1] / sum(teeth))
-        along, slope = along / np.linalg.norm(along), math.tan(number(gear.get("pressure_angle", "0.3490658503988659")))
-        force = size * (QUARTER @ along) - abs(size) * slope * along
+        hinges = {name: joint for name, joint in mechanism["joints"].items() if joint["type"] == "revolute"}
+
+        def point(name: str, body: str) -> str:
+            joint = hinges[name]
+            return str(joint.get("points", (name, name))[joint["bodies"].index(body)])
+
+        for carrier in ("frame", *mechanism["bodies"]):
+            found = []
+            for wheel in gear["bodies"]:
+                ways = [
+                    (point(name, carrier), [(name, wheel)])
+                    for name, joint in hinges.items()
+                    if {*joint["bodies"]} == {carrier, wheel} and carrier != wheel
+                ]
+                ways += [
+                    (point(two, carrier), [(one, wheel), (two, third)])
+                    for one, first in hinges.items()
+                    if wheel in first["bodies"]
+                    for third in [next(body for body in first["bodies"] if body != wheel)]
+                    for two, second in hinges.items()
+                    if {*second["bodies"]} == {carrier, third} and point(one, third) == point(two, third)
+                ]
+                found.append(ways[0] if ways else None)
+            if carrier not in gear["bodies"] and None not in found:
+                return carrier, [way for way in found if way is not None]
+        raise AssertionError("no body carries both axes")
+
+    def _teeth(self, name: str, torque: float, q: Array) -> tuple[Array, float, list[tuple[str, str, float]]]:
+        """Force of the second wheel on the first, its size along the line of action, and hinges that it passes through.
+
+        The multiplier is the torque of the teeth, or of the belt, on the second wheel.
+        """
+        gear, still = self.gears[name], np.zeros(self.size)
+        carrier, axes = self.axes(self.mechanism, gear)
+        centers = [self.point(carrier, self.arm(carrier, point), q, still)[0] for point, _ in axes]
+        hinges = [(*step, sign) for (_, way), sign in zip(axes, (1.0, -1.0), strict=True) for step in way]
+        apart, teeth = centers[1] - centers[0], gear["teeth"]
+        far = float(np.linalg.norm(apart))
+        along = apart / far
+        if gear.get("type") == "belt":
+            radii = number(gear["radius"]) * np.array([1.0, teeth[1] / teeth[0]])
+            for side in (1.0, -1.0):  # one of the strands pulls
+                cosine = (radii[0] - radii[1]) / far
+                out = cosine * along + side * math.sqrt(1 - cosine**2) * (QUARTER @ along)
+                strand = (apart + (radii[1] - radii[0]) * out) / math.sqrt(far**2 - (radii[0] - radii[1]) ** 2)
+                lever = radii[1] * float((QUARTER @ out) @ -strand)
+                if torque / lever >= 0.0:
+                    return torque / lever * strand, torque / lever, hinges
+        ratio = self._ratio(gear)
+        pitch = far * teeth[0] / (teeth[0] - math.copysign(teeth[1], ratio))  # from the first axis on
+        size, slope = torque / (far - pitch), math.tan(number(gear.get("pressure_angle", "0.3490658503988659")))
+        force = size * (QUARTER @ along) + math.copysign(abs(size) * slope, ratio) * along
         return force, abs(size) * math.hypot(1.0, slope), hinges
 
     def _play(self, q: Array, v: Array) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:
@@ -452,35 +513,58 @@ class Reference:
             q[self.index[self.driven] + 2] = self.start
             found, worst = self.closed(self.start, q, {})
             if worst < 1e-13 and self._on_branches(found):
-                for k in self.index.values():
-                    if k != self.index[self.driven]:
-                        found[k + 2] = math.remainder(found[k + 2], TURN)
+                for name, k in self.index.items():
+                    if name not in self.exact:
+                        near = self._near(name)
+                        found[k + 2] = near + math.remainder(found[k + 2] - near, TURN)
                 return self.closed(self.start, found, {})[0]
         raise AssertionError("no pose on the branches of the scene was found")
 
     def _beyond(self, entry: Tables, size: float, free: float) -> float:
         """Beyond a free size; an angle within half a turn of the free one where the bodies turn against each other.
 
-        Else it has no jump, and its mean over a turn of the driver is within half a turn of the free angle.
+        Else it has no jump, and its mean is within half a turn of the free angle: over a turn of the driver, a period
+        of its swing, or its range.
         """
         if "points" in entry:
             return size - free
         first, second = entry["bodies"]
+
+        def at(angle: float) -> float:
+            q = self.pose(angle, {})
+            return self.angle(second, q) - self.angle(first, q)
+
         if (first, second) not in self._means:
-            found = []
-            for k in range(61):
-                q = self.pose(self.start + math.radians(6 * k), {})
-                found.append(self.angle(second, q) - self.angle(first, q))
-            self._means[first, second] = float(np.mean(found[:-1])) if abs(found[-1] - found[0]) < 1.0 else None
+            if "swing" in self.driver:
+                most = number(self.driver["swing"]["amplitude"])
+                angles = [self.start + most * math.sin(math.radians(6 * k)) for k in range(60)]
+            elif "range" in self.driver:
+                angles = list(np.linspace(*(number(self.driver["range"][end]) for end in ("start", "end")), 61))
+            else:
+                whole = 12 if self.gears else 1  # the machine repeats after some of these
+                angles = [self.start + math.radians(6 * k) for k in range(60 * whole)]
+            found = [at(angle) for angle in angles]
+            turns = not {"swing", "range"} & {*self.driver} and abs(at(self.start + whole * TURN) - found[0]) > 1.0
+            self._means[first, second] = None if turns else float(np.mean(found))
         mean = self._means[first, second]
         if mean is None:
             return math.remainder(size - free, TURN)
         return size - free - TURN * round((mean - free) / TURN)
 
+    def _near(self, body: str) -> float:
+        """Half a turn from which the angle of a body that a dyad places may be, at the start."""
+        for gear in self.gears.values():
+            if body in gear["bodies"] and self.axes(self.mechanism, gear)[0] == "frame":
+                return number(gear.get(f"{('first', 'second')[gear['bodies'].index(body)]}_angle", 0.0))
+        return 0.0
+
     def _on_branches(self, q: Array) -> bool:
-        wheels = {body for gear in self.gears.values() for body in gear["bodies"]}
-        placed, still = {"frame", self.driven, *wheels}, np.zeros(self.size)
+        placed, still = {"frame", self.driven}, np.zeros(self.size)
         while True:
+            wheels = [{*gear["bodies"]} for gear in self.gears.values() if self.axes(self.mechanism, gear)[0] in placed]
+            if loose := next((pair - placed for pair in wheels if len(pair - placed) == 1), None):
+                placed |= loose
+                continue
             for name, joint in self.joints.items():  # noqa: B007 - used after the loop
                 pair = joint["bodies"]
                 outer = [
@@ -550,6 +634,10 @@ class Reference:
             float(slopes[np.searchsorted(times, time, side="right")]),
         )
 
+    def _phase(self, time: float, angle: float) -> float:
+        """The angle that windows and tables are over: of a driver that swings its phase."""
+        return TURN * number(self.driver["swing"]["frequency"]) * time if "swing" in self.driver else angle
+
     def motor(self, speed: float) -> float:
         law = self.driver["torque"]
         if law["law"] == "none":
@@ -566,9 +654,9 @@ class Reference:
         ratio = (1 - speed / number(law["synchronous_speed"])) / law["breakdown_slip"]
         return 2 * number(law["breakdown_torque"]) / (ratio + 1 / ratio)
 
-    def load(self, time: float) -> Array:
-        """Sum of the loads on inner rings."""
-        total, (angle, speed, _) = np.zeros(2), self.driven_at(time)
+    def loads(self, time: float) -> Iterator[tuple[float, Array]]:
+        """Places along the shaft and forces of the loads on inner rings."""
+        angle, speed, _ = self.driven_at(time)
         for data in [self.scene["load"]] if "load" in self.scene else self.scene.get("loads", {}).values():
             kind = data["type"]
             if kind == "constant":
@@ -590,8 +678,7 @@ class Reference:
             if "time_window" in data:
                 until = number(data["time_window"].get("end", math.inf))
                 force = force * (number(data["time_window"]["start"]) <= time < until)
-            total = total + force
-        return total
+            yield number(data.get("position", 0.0)), force
 
     def _share(self, entry: Tables, name: str, angle: float) -> Any:
         """A force or torque of the scene at an angle of the driver."""
@@ -689,40 +776,89 @@ class Reference:
     def evaluate(self, time: float, state: Mapping[str, float]) -> dict[str, Any]:
         """Second derivatives of coordinates (`inner.x`: ``a.inner.x``) and outputs."""
         out: dict[str, Any] = {}
-        load, shaft = self.load(time), np.zeros(2)
         if self.mechanism is not None:
             out |= self._linkage(time, state)
-            name = self.driver["joint"]
-            if self.bearings and not self.two_way:
-                sign = 1.0 if self.joints[name]["bodies"][0] == "frame" else -1.0
-                shaft = sign * np.array([out[f"reaction.{name}.{axis}"] for axis in "xy"])
+        elif "transverse_inertia" in self.scene["shaft"]:
+            return self._tilting(time, state)
         for one in [] if self.two_way else self.bearings:
-            share = one.data.get("share", 1.0)
-            out |= self._one_way(one, time, state, share * load if self.mechanism is None else share * shaft + load)
+            share, load = one.data.get("share", 1.0), np.zeros(2)
+            for place, force in self.loads(time):
+                load += self._lever(one, place) * force
+            if self.mechanism is not None:
+                joint = one.data["joint"]
+                sign = 1.0 if self.joints[joint]["bodies"][0] == "frame" else -1.0
+                shaft = sign * np.array([out[f"reaction.{joint}.{axis}"] for axis in "xy"])
+                load = share * shaft + (load if joint == self.driver["joint"] else 0.0)
+            found, force = self._one_way(one, time, state)
+            ring = one.data["inner_ring"]
+            out |= found | self._named(f"{one.name}load", load)
+            out |= self._named(f"a.{one.name}inner", (load - force) / self._mass(ring))
         return out
 
-    def _one_way(self, one: Bearing, time: float, state: Mapping[str, float], load: Array) -> dict[str, Any]:
-        def turned(at: float) -> tuple[float, float]:
-            angle = self.driven_at(at)[0] - self.driven_at(0.0)[0]
-            return (0.0, angle) if one.stands else (angle, 0.0)
+    def _lever(self, one: Bearing, place: float) -> float:
+        """Share of a bearing in a load of a shaft at a place."""
+        if self.mechanism is not None or "position" not in one.data:
+            return float(one.data.get("share", 1.0)) if self.mechanism is None else 1.0
+        here = number(one.data["position"])
+        (there,) = (number(other.data["position"]) for other in self.bearings if other is not one)
+        return (there - place) / (there - here)
+
+    def _tilting(self, time: float, state: Mapping[str, float]) -> dict[str, Any]:
+        """A rigid rotor: Newton's law for its centre, Euler's for the slopes of its axis."""
+        shaft, out = self.scene["shaft"], dict[str, Any]()
+        first, second = (number(one.data["position"]) for one in self.bearings[:2])
+        center, span = number(shaft.get("center_of_mass", 0.0)), second - first
+        ends = [
+            np.array([state[f"{one.name}inner.{kind}{axis}"] for kind in ("", "v") for axis in "xy"])
+            for one in self.bearings[:2]
+        ]
+        force, moment = np.zeros(2), np.zeros(2)
+        for place, load in self.loads(time):
+            force, moment = force + load, moment + (place - center) * load
+        for one in self.bearings:
+            place = number(one.data["position"])
+            here = ends[0] + (place - first) / span * (ends[1] - ends[0])
+            off = vector(one.data["offset"]) if "offset" in one.data else np.zeros(2)
+            names = [f"{one.name}inner.{kind}{axis}" for kind in ("", "v") for axis in "xy"]
+            moved = {**state, **dict(zip(names, here - [*off, 0.0, 0.0], strict=True))}
+            found, held = self._one_way(one, time, moved)
+            out |= found
+            force, moment = force - held, moment - (place - center) * held
+        rate = (ends[1] - ends[0])[2:] / span
+        spin = 0.0 if self.bearings[0].stands else self.driven_at(time)[1]
+        gyroscopic = number(shaft.get("polar_inertia", 0.0)) * spin * (QUARTER @ rate)
+        bent = (moment + gyroscopic) / number(shaft["transverse_inertia"])
+        start = force / number(shaft["mass"]) + (first - center) * bent
+        for one, place in zip(self.bearings[:2], (first, second), strict=True):
+            out |= self._named(f"a.{one.name}inner", start + (place - first) * bent)
+        return out
+
+    def _turned(self, one: Bearing, time: float) -> tuple[Array, Array]:
+        """Angles of both rings since the start, and their rates."""
+        angle, rate, _ = self.driven_at(time)
+        turned = np.array([angle - self.driven_at(0.0)[0], rate])
+        if self.mechanism is not None:
+            turned *= self.exact[next(b for b in self.joints[one.data["joint"]]["bodies"] if b != "frame")]
+        outer = number(self.scene.get("shaft", {}).get("outer_speed", 0.0)) * np.array([time, 1.0])
+        both = np.array([outer, turned] if one.stands else [turned, outer])
+        return both[:, 0], both[:, 1]
+
+    def _one_way(self, one: Bearing, time: float, state: Mapping[str, float]) -> tuple[dict[str, Any], Array]:
+        """Outputs, and the force that holds the inner ring."""
 
         def place(name: str) -> Array:
             return np.array([state.get(f"{one.name}{name}{axis}", 0.0) for axis in "xy"])
 
         inner, outer, speed, slow = place("inner."), place("outer."), place("inner.v"), place("outer.v")
-        rate = self.driven_at(time)[1]
-        rates = np.array([0.0, rate] if one.stands else [rate, 0.0])
-        lag = one.lag(time, turned)
-        out, _ = one.contacts(time, inner - outer, speed - slow, np.array(turned(time)), rates, lag)
+        turned, rates = self._turned(one, time)
+        lag = one.lag(time, lambda at: self._turned(one, at)[0])
+        out, _ = one.contacts(time, inner - outer, speed - slow, turned, rates, lag)
         force = np.array([out[f"{one.name}ring_force.{axis}"] for axis in "xy"])
-        ring = one.data["inner_ring"]
-        net = load - force - number(ring.get("damping", 0.0)) * speed
-        out |= self._named(f"{one.name}load", load) | self._named(f"a.{one.name}inner", net / self._mass(ring))
         if one.elastic:
             housing = one.data["outer_ring"]
             held = number(housing["stiffness"]) * outer + number(housing["damping"]) * slow
             out |= self._named(f"a.{one.name}outer", (force - held) / number(housing["mass"]))
-        return out
+        return out, force + number(one.data.get("inner_ring", {}).get("damping", 0.0)) * speed
 
     def _mass(self, ring: Tables) -> float:
         """Eq. (3)."""
@@ -759,7 +895,7 @@ class Reference:
             slopes.append(jacobian)
             ends.append([state[f"{name}.v{axis}"] for axis in "xy"])
         v = np.linalg.solve(np.vstack(slopes), np.concatenate(ends))
-        pushed, out = self.applied(q, v, angle)
+        pushed, out = self.applied(q, v, self._phase(time, angle))
         masses = self.masses()
         fall = vector(self.mechanism["gravity"], (0.0, -1.0)) if "gravity" in self.mechanism else np.zeros(2)
         for k in [*self.index.values(), *self.rings.values()]:
@@ -789,12 +925,12 @@ class Reference:
                 out[f"reaction.{name}.moment"] = -float(forces[where[name] + 1])
             out |= self._named(f"reaction.{name}", reaction)
         for name in self.gears:
-            force, out[f"gear.{name}.force"], hinges = self._teeth(name, float(forces[where[name]]))
+            force, out[f"gear.{name}.force"], hinges = self._teeth(name, float(forces[where[name]]), q)
             out |= self._named(f"reaction.{name}", force)
-            for sign, (hinge, body) in zip((1.0, -1.0), hinges.items(), strict=True):
-                on_frame = sign if self.joints[hinge]["bodies"][1] == body else -sign
+            for hinge, body, sign in hinges:
+                on_first = sign if self.joints[hinge]["bodies"][1] == body else -sign
                 held = [out[f"reaction.{hinge}.{axis}"] for axis in "xy"]
-                out |= self._named(f"reaction.{hinge}", np.array(held) + on_frame * force)
+                out |= self._named(f"reaction.{hinge}", np.array(held) + on_first * force)
         for name, (_, jacobian, left) in self._play(q, v):
             out |= self._named(f"a.{name}", jacobian @ accelerations + left)
         if motor:
