@@ -237,6 +237,20 @@ def test_a_bearing_loaded_one_way_turns_with_its_wheel(model_of: Callable[..., M
     assert life[0].life == pytest.approx(life[1].life, rel=1e-6)
 
 
+def test_the_frame_may_be_either_body_at_a_wheel_on_a_bearing_loaded_one_way() -> None:
+    """With the bodies of its joint exchanged the reaction has the other sign, and the bearing the same load."""
+    machine, at = two_wheels(30.0), WHEEL + RUN
+    given = machine.mechanism.joint("E")
+    other = machine.with_joint("E", bodies=given.bodies[::-1], points=given.points[::-1])
+    x = np.array([2e-6, -1e-6, 0.01, 0.02])
+    one, two = (Derived(scene_from_text(linkage_text(m) + at, "w")) for m in (machine, other))
+    found, exchanged = (derived.outputs(0.1, x, {}) for derived in (one, two))
+    for axis in "xy":
+        assert exchanged[f"load.{axis}"] == pytest.approx(found[f"load.{axis}"], rel=1e-13)
+        assert exchanged[f"reaction.E.{axis}"] == pytest.approx(-found[f"reaction.E.{axis}"], rel=1e-13)
+    np.testing.assert_allclose(two.rhs(0.1, x, {}), one.rhs(0.1, x, {}), rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("machine", "at", "words"),
     [

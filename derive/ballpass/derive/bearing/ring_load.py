@@ -51,7 +51,10 @@ def load_on(
     share = sp.S.One if bearing.share is None else symbol_of(bearing.share)
     if linkage is None or reactions is None:
         return scale(share, own.force) if lever is None else lever.bears(own.force, own.moment)
-    reaction = scale(share, reactions.joint_force[bearing.joint or ""])  # on the frame, the first body
+    joint = linkage.mechanism.joint(bearing.joint or "")
+    reaction = scale(
+        -share if joint.bodies[0] in linkage.poses else share, reactions.joint_force[joint.name]
+    )  # on the frame
     if bearing.joint != linkage.driver.name:
         return reaction
     if lever is None:

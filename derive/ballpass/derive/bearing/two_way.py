@@ -73,7 +73,7 @@ def play_of(bearing: Bearing, joint: Joint, inner: Motion) -> Motion:
 def carriers_of(bearing: Bearing, linkage: Linkage) -> tuple[str, str]:
     """The bodies that carry inner and outer ring: one-way the moving body and the frame."""
     if bearing.coupling == "one-way":
-        return linkage.mechanism.joint(bearing.joint or "").bodies[1], FRAME
+        return linkage.mechanism.joint(bearing.joint or "").other(FRAME), FRAME
     return bearing.inner_body, linkage.mechanism.joint(bearing.joint or "").other(bearing.inner_body)
 
 

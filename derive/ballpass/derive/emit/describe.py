@@ -119,7 +119,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             joint=bearing.joint or "",
             inner_body=""
             if system.linkage is None
-            else bearing.inner_body or system.linkage.mechanism.joint(bearing.joint or "").bodies[1],
+            else bearing.inner_body or system.linkage.mechanism.joint(bearing.joint or "").other(FRAME),
             ring_speed=f"{bearing.path}.ring_speed"
             if f"{bearing.path}.ring_speed" in constants
             else speed.path

@@ -201,8 +201,8 @@ def _read_place(
 def _driven_hinges(mechanism: Mechanism, driven: str) -> list[str]:
     """Hinges on the frame of bodies that the driver turns, or a gear."""
     turned = {driven, *(wheel for gear in mechanism.gears for wheel in gear.bodies)}
-    hinges = (joint for joint in mechanism.joints if joint.kind == "revolute" and joint.bodies[:1] == (FRAME,))
-    return [joint.name for joint in hinges if joint.bodies[1] in turned]
+    hinges = (joint for joint in mechanism.joints if joint.kind == "revolute" and FRAME in joint.bodies)
+    return [joint.name for joint in hinges if joint.other(FRAME) in turned]
 
 
 def _read_damping(table: Table, element: RollingElement) -> Damping:
