@@ -258,13 +258,17 @@ free_angle = "80 deg"
 bodies = ["arm", "frame"]
 stiffness = "1 N*m/rad"
 free_angle = "-60 deg"
+[mechanism.torsion_stops.at_coupler]
+bodies = ["frame", "coupler"]
+stiffness = "300 N*m/rad"
+free_angle = "-130 deg"
 [run]
 """
     table = (
         'start_angle = "60 deg"\nrange = { start = "20 deg", end = "100 deg" }\n'
         'table = { time = ["0 s", "0.2 s", "0.6 s", "0.8 s"], speed = ["0 rad/s", "3 rad/s", "-3 rad/s", "0 rad/s"] }'
     )
-    text = ROCKERS.replace("[run]", springs).replace("outputs = [", 'outputs = ["body.*", "torsion_spring.*", ')
+    text = ROCKERS.replace("[run]", springs).replace("outputs = [", 'outputs = ["body.*", "torsion_*", ')
     run = model_of(
         text.replace(DRIVER, table).replace("cycles = 1\ntransient_cycles = 0", 'duration = "0.8 s"')
     ).simulate()
@@ -272,6 +276,9 @@ free_angle = "-60 deg"
     rocker = np.unwrap(run["body.rocker.angle"])
     np.testing.assert_allclose(run["torsion_spring.at_rocker.torque"], rocker - math.radians(80.0), atol=1e-12)
     np.testing.assert_allclose(run["torsion_spring.at_arm.torque"], MEAN - run["body.arm.angle"], atol=1e-12)
+    # the mean over the range counts: that of the coupler over all angles of the linkage is half a turn further
+    clear = -math.radians(130.0) - run["body.coupler.angle"]
+    np.testing.assert_allclose(run["torsion_stop.at_coupler.compression"], clear, atol=1e-12)
 
 
 def test_balls_in_a_linkage_that_cannot_turn_round_roll_with_its_bodies(model_of: Callable[..., Model]) -> None:

@@ -268,8 +268,11 @@ class Visitor:
         if isinstance(expression, Ideal):
             return at(expression.args[1])(expression.args[0])
         if isinstance(expression, Average):
-            phases = (2.0 * math.pi * k / POINTS for k in range(POINTS))
-            return ca.SX(reduce(add, (at(phase)(expression.args[0]) for phase in phases)) / POINTS)
+            value, first, last, *_ = expression.args
+            places = (first + (last - first) * (k + 0.5) / POINTS for k in range(POINTS))
+            found = [at(place)(value) for place in places]
+            sum_ = reduce(add, (ca.if_else(_is_number(one), one, 0.0) for one in found))
+            return ca.SX(sum_ / reduce(add, map(_is_number, found)))
         cos, sin, _, start, period, *others = expression.args
         count = int(period) * POINTS
         angles = [start + 2.0 * math.pi * k / POINTS for k in range(count)]

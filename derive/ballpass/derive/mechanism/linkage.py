@@ -107,9 +107,13 @@ class Linkage:
 
     @property
     def turns(self) -> int:
-        """Turns of the driver after which all bodies are where they were."""
+        """Turns of the driver, or periods of its swing, after which all bodies are where they were."""
+        return self.turns_of(self.drive.angle)
+
+    def turns_of(self, driver: sp.Expr) -> int:
+        """Turns of the driver's angle, or of the driven body's, after which they are."""
         angles = (pose.angle for pose in self.poses.values())
-        ratios = (sp.diff(angle, self.drive.angle) for angle in angles if angle is not None)
+        ratios = (sp.diff(angle, driver) for angle in angles if angle is not None)
         return math.lcm(*(sp.Rational(ratio).q for ratio in ratios))
 
     @property

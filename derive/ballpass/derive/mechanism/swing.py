@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.kinematics import subscript
+from ballpass.derive.mechanism.kinematics import Pair, subscript
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.terms import Definition, symbol_of
+from ballpass.derive.terms import Definition, defined, symbol_of
 from ballpass.derive.variables import Terms
 
 #: Angles of the driver at which the ideal linkage is evaluated.
@@ -38,7 +38,8 @@ class Ideal(sp.Function):  # type: ignore[misc]
 
 
 class Average(sp.Function):  # type: ignore[misc]
-    """``Average(angle, *positions)``: of a defined angle over a period of the driver's swing, joints without play."""
+    """``Average(angle, first, last, *positions)``: of a defined angle from one angle of the driver to another, joints
+    without play, as far as the linkage can be assembled [rad]."""
 
 
 class Turns(sp.Function):  # type: ignore[misc]
@@ -58,7 +59,7 @@ OF_IDEAL_LINKAGE = (Ideal, Average, Turns, Mean)
 
 def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
     """The coordinates that are zero in a function of the ideal linkage."""
-    return tuple(function.args[{Ideal: 2, Average: 1, Turns: 5, Mean: 6}[function.func] :])
+    return tuple(function.args[{Ideal: 2, Average: 3, Turns: 5, Mean: 6}[function.func] :])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,55 +90,44 @@ def with_driver(drive: Drive) -> Swing:
     return Swing(turns=sp.S.One, rate=drive.speed)
 
 
-def followed(linkage: Linkage, cos: sp.Expr, sin: sp.Expr, turns: sp.Symbol, mean: sp.Symbol) -> tuple[sp.Expr, ...]:
-    """What `turns` and `mean` of a direction are, and its angle less these turns of the driven body [rad]."""
-    angle, start = linkage.drive.driven[0], symbol_of(linkage.mechanism.driver.start_angle)
-    swept, known = (cos, sin, angle, start, linkage.turns), turns * angle + mean
-    ahead, across = sp.cos(known), sp.sin(known)
-    rest = mean + sp.atan2(sin * ahead - cos * across, cos * ahead + sin * across)
-    return Turns(*swept, *linkage.positions), Mean(*swept, turns, *linkage.positions), rest
+def nearest(direction: Pair, known: sp.Expr) -> sp.Expr:
+    """The angle of a direction, cosine and sine, within half a turn of a known one [rad]."""
+    (cos, sin), ahead, across = direction, sp.cos(known), sp.sin(known)
+    return known + sp.atan2(sin * ahead - cos * across, cos * ahead + sin * across)
+
+
+def followed(linkage: Linkage, name: str, words: str, direction: Pair) -> tuple[Definition, Definition, sp.Expr]:
+    """Turns of a direction in one of the driven body and mean of the rest, and its angle with these turns [rad]."""
+    driven, start, mark = linkage.drive.driven[0], linkage.mechanism.driver.start_angle, subscript(name.split(".")[1])
+    swept, closed = (*direction, driven, symbol_of(start), linkage.turns_of(driven)), linkage.positions
+    text = f"Turns of {words} in a turn of the driven body"
+    turns = defined(f"{name}.turns", Turns(*swept, *closed), "1", text, f"N_{{{mark}}}")
+    mean = Mean(*swept, turns.symbol, *closed)
+    rest = defined(f"{name}.mean_angle", mean, "rad", f"Mean angle of {words} less these turns", f"m_{{{mark}}}")
+    return turns, rest, nearest(direction, turns.symbol * driven + rest.symbol)
 
 
 def swing_of(linkage: Linkage, body: str) -> Swing:
     """Angle of a body of a linkage, or of its frame."""
-    drive, pose = linkage.drive, linkage.pose(body)
+    drive, pose, mark = linkage.drive, linkage.pose(body), subscript(body)
     if body == linkage.driven and drive.swings is None:
         return with_driver(drive)
     if sp.sympify(pose.cos).is_number:
         return STILL
     if pose.angle is not None and drive.swings is None:  # in proportion to the driver's
         return Swing(turns=sp.diff(pose.angle, drive.angle), rate=pose.rate)
-    mark = subscript(body)
-    turns, mean, swing, at_start = (
-        sp.Symbol(f"body.{body}.{name}", real=True) for name in ("turns", "mean_angle", "swing", "swing_at_start")
-    )
-    whole, middle, rest = followed(linkage, pose.cos, pose.sin, turns, mean)
-    constants = [
-        (turns, whole, "1", f"Turns of the {body} in a turn of the driver", "N"),
-        (mean, middle, "rad", f"Mean of the rest of the {body}'s angle", "m"),
-        (
-            at_start,
-            Ideal(swing, drive.first_angle, *linkage.positions),
-            "rad",
-            f"Swing of the {body} at the start, ideal",
-            "s^0",
-        ),
-    ]
+    turned, mean, angle = followed(linkage, f"body.{body}", f"the {body}", (pose.cos, pose.sin))
+    turns = turned.symbol if drive.swings is None else sp.S.Zero
     words = f"Angle of the {body} less its whole turns with the driver"
-    if drive.swings is not None:
-        rest, words = turns * drive.driven[0] + rest, f"Angle of the {body}"
-    if pose.angle is not None:
-        rest, constants = pose.angle, constants[2:]
+    swing = defined(f"body.{body}.swing", angle - turns * drive.angle, "rad", words, rf"\sigma_{{{mark}}}")
+    first = Ideal(swing.symbol, drive.first_angle, *linkage.positions)
+    words = f"Swing of the {body} at the start, ideal"
+    at_start = defined(f"body.{body}.swing_at_start", first, "rad", words, f"s^0_{{{mark}}}")
     return Swing(
-        turns=turns if drive.swings is None else sp.S.Zero,
-        swing=swing,
-        at_start=at_start,
+        turns=turns,
+        swing=swing.symbol,
+        at_start=at_start.symbol,
         rate=pose.rate,
-        constants=tuple(
-            Definition(symbol=s, expression=e, unit=u, description=d, latex=rf"{letter}_{{{mark}}}")
-            for s, e, u, d, letter in constants
-        ),
-        definitions=(
-            Definition(symbol=swing, expression=rest, unit="rad", description=words, latex=rf"\sigma_{{{mark}}}"),
-        ),
+        constants=(turned, mean, at_start),
+        definitions=(swing,),
     )
