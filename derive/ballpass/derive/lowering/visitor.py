@@ -273,23 +273,17 @@ class Visitor:
             found = [at(place)(value) for place in places]
             sum_ = reduce(add, (ca.if_else(_is_number(one), one, 0.0) for one in found))
             return ca.SX(sum_ / reduce(add, map(_is_number, found)))
-        cos, sin, _, start, period, *others = expression.args
-        count = int(period) * POINTS
-        angles = [start + 2.0 * math.pi * k / POINTS for k in range(count)]
+        cos, sin, _, start, period, *_ = expression.args
+        angles = (start + 2.0 * math.pi * k / POINTS for k in range(int(period) * POINTS))
         seen = [(visit(cos), visit(sin)) for visit in map(at, angles)]
         if isinstance(expression, Turns):
             steps = [_angle_between(one, other) for one, other in pairwise([*seen, seen[0]])]
             total, most = reduce(add, steps), reduce(ca.fmax, map(ca.fabs, steps))
             whole = ca.floor(total / (2.0 * ca.pi) + 0.5) / int(period)
             return ca.SX(ca.if_else(_is_number(total), ca.if_else(most < FARTHEST, whole, ca.inf), 0.0))
-        turned = [self(others[0] * angle) for angle in angles]
-        rest = [
-            (c * ca.cos(a) + s * ca.sin(a), s * ca.cos(a) - c * ca.sin(a))
-            for (c, s), a in zip(seen, turned, strict=True)
-        ]
-        first = ca.atan2(rest[0][1], rest[0][0])
+        first = ca.atan2(seen[0][1], seen[0][0])
         total, known, locks = first, ca.SX(1.0), ca.SX(1.0)
-        for way in (rest, [rest[0], *rest[:0:-1]]):  # back from the start as well where the way on locks
+        for way in (seen, [seen[0], *seen[:0:-1]]):  # back from the start as well where the way on locks
             angle, valid = first, locks
             for one, other in pairwise(way):
                 step = _angle_between(one, other)

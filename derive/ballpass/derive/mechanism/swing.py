@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.kinematics import Pair, subscript
+from ballpass.derive.mechanism.kinematics import Pair, rotate, subscript
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.terms import Definition, defined, symbol_of
 from ballpass.derive.variables import Terms
@@ -49,8 +49,8 @@ class Turns(sp.Function):  # type: ignore[misc]
 
 
 class Mean(sp.Function):  # type: ignore[misc]
-    """``Mean(cos, sin, angle, start, period, turns, *positions)``: mean angle of a direction less its turns over a
-    period, followed from the start on as far as the linkage does not lock, rounded [rad]."""
+    """``Mean(cos, sin, angle, start, period, *positions)``: mean angle over a period of a direction that makes no turn,
+    followed from the start on as far as the linkage does not lock, rounded [rad]."""
 
 
 #: Functions of the linkage without play: constants of a run.
@@ -59,7 +59,7 @@ OF_IDEAL_LINKAGE = (Ideal, Average, Turns, Mean)
 
 def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
     """The coordinates that are zero in a function of the ideal linkage."""
-    return tuple(function.args[{Ideal: 2, Average: 3, Turns: 5, Mean: 6}[function.func] :])
+    return tuple(function.args[{Ideal: 2, Average: 3, Turns: 5, Mean: 5}[function.func] :])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,19 +99,18 @@ def nearest(direction: Pair, known: sp.Expr) -> sp.Expr:
 def followed(linkage: Linkage, name: str, words: str, direction: Pair) -> tuple[Definition, Definition, sp.Expr]:
     """Turns of a direction in one of the driven body and mean of the rest, and its angle with these turns [rad]."""
     driven, start, mark = linkage.drive.driven[0], linkage.mechanism.driver.start_angle, subscript(name.split(".")[1])
-    swept, closed = (*direction, driven, symbol_of(start), linkage.turns_of(driven)), linkage.positions
+    swept = driven, symbol_of(start), linkage.turns_of(driven), *linkage.positions
     text = f"Turns of {words} in a turn of the driven body"
-    turns = defined(f"{name}.turns", Turns(*swept, *closed), "1", text, f"N_{{{mark}}}")
-    mean = Mean(*swept, turns.symbol, *closed)
+    turns = defined(f"{name}.turns", Turns(*direction, *swept), "1", text, f"N_{{{mark}}}")
+    known = turns.symbol * driven
+    mean = Mean(*rotate(sp.cos(known), -sp.sin(known), direction), *swept)
     rest = defined(f"{name}.mean_angle", mean, "rad", f"Mean angle of {words} less these turns", f"m_{{{mark}}}")
-    return turns, rest, nearest(direction, turns.symbol * driven + rest.symbol)
+    return turns, rest, nearest(direction, known + rest.symbol)
 
 
 def swing_of(linkage: Linkage, body: str) -> Swing:
     """Angle of a body of a linkage, or of its frame."""
     drive, pose, mark = linkage.drive, linkage.pose(body), subscript(body)
-    if body == linkage.driven and drive.swings is None:
-        return with_driver(drive)
     if sp.sympify(pose.cos).is_number:
         return STILL
     if pose.angle is not None and drive.swings is None:  # in proportion to the driver's
