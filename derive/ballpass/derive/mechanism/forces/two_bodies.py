@@ -78,6 +78,8 @@ def _excess(force: Force, setting: Setting, direction: Pair) -> sp.Expr:
     text = f"Mean excess of {words}, if they swing"
     about = defined(f"{label}.mean_excess", swings * mean, "rad", text, f"M_{{{mark}}}")
     turns = defined(f"{label}.turns", whole, "1", f"Turns of {words} in a turn of the driver", f"n_{{{mark}}}")
-    setting.constants.extend((turned, rest, about, turns))
     left_out = 2 * sp.pi * sp.floor(about.symbol / (2 * sp.pi) + sp.Rational(1, 2))
-    return (nearest(direction, about.symbol) if linkage.drive.swings is None else angle) - left_out
+    text = f"Whole turns left out of the excess of {words}"
+    less = defined(f"{label}.left_out", left_out, "rad", text, f"L_{{{mark}}}")
+    setting.constants.extend((turned, rest, about, turns, less))
+    return (nearest(direction, about.symbol) if linkage.drive.swings is None else angle) - less.symbol
