@@ -358,7 +358,8 @@ def _two_bearings(text: str) -> str:
 def _of_left(text: str) -> str:
     """Names of the first of two bearings."""
     text = re.sub(r"(?<![\w.])(inner|outer|ball|load|cage|ring_force)\.", r"left.\1.", text)
-    text = re.sub(r"\blife(_\w+)?\b", r"left.life\1", text).replace("static_", "static_left_")
+    text = re.sub(r"\b(life|static_safety)\b", r"left.\1", text)
+    text = re.sub(r"\bstatic_(?!safety)", "static_left_", text)
     return re.sub(r"\bbearing\.", "bearings.left.", text)
 
 
@@ -405,7 +406,7 @@ TWINS = [
     *_numbers("frame turned", _turned, renamed=_as_turned, signs=False, but=_PLACES),
     *_numbers("frame mirrored", _mirrored, renamed=_as_mirrored, signs=False, but=_PLACES + _BALLS),
     # words have other prefixes of units, and ratings are no powers of lengths
-    *_numbers("other units", **_in_other_units(LENGTH, MASS, TIME), but=f"{_WORDS}|life|bearings/"),
+    *_numbers("other units", **_in_other_units(LENGTH, MASS, TIME), but=f"{_WORDS}|life|safety|bearings/"),
     *_numbers("other units of mass and time", **_in_other_units(1.0, TIME**2, TIME), but=_WORDS),
 ]
 

@@ -19,8 +19,10 @@ from ballpass.runtime.contract.method_registry import METHODS
 from ballpass.runtime.native import driver_library
 from ballpass.runtime.native.compilers import find_compiler
 from ballpass.runtime.native.reduction_rows import BALL_CHANNELS
+from ballpass.runtime.ratings.elements import RATED
 
 #: What is reduced of a channel.
+OF_RATINGS = ("life", "static_safety")
 KINDS = ("max", "min", "peak_time", "min_time", "mean", "rms")
 WITH_BALLS = ("damping law", "rolling element", "effect")
 BOTH_WAYS = bearing("A", effects=LAGGING), bearing("B", "rod", effects=EFFECTS)
@@ -79,7 +81,12 @@ def observables(model: Model) -> list[str]:
         *(f"end:{name}" for name in states),
         *(f"{kind}:{name}" for name in (*states, *of_balls) for kind in KINDS),
         *(f"peak_ball:{name}" for name in of_balls),
-        *(f"{bearing.prefix}life" for bearing in bearings),
+        *(
+            f"{bearing.prefix}{name}"
+            for bearing in bearings
+            for name in OF_RATINGS
+            if not RATED[bearing.element].unrated
+        ),
     ]
 
 
