@@ -25,7 +25,7 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.export.c_program import export_c
 
-COUNT = int(os.environ.get("BALLPASS_SCENES", 48))
+COUNT = int(os.environ.get("BALLPASS_SCENES", 24))
 #: Of some kinds of machine one; 25 and 56 could not be derived once.
 QUICK = (0, 5, 25, 56, FIRST, FIRST + 1, FIRST + 4)
 #: Of which COUNT are drawn, each.
