@@ -75,11 +75,9 @@ def _excess(force: Force, setting: Setting, direction: Pair) -> sp.Expr:
         mean = Average(angle, first, last, *linkage.positions)
     else:
         whole, swings, mean = ratio, sp.Max(1 - 2 * linkage.turns * sp.Abs(ratio), 0), rest.symbol
-    text = f"Mean excess of {words}, if they swing"
-    about = defined(f"{label}.mean_excess", swings * mean, "rad", text, f"M_{{{mark}}}")
+    about = defined(f"{label}.mean_excess", swings * mean, "rad", f"Mean excess of {words}", f"M_{{{mark}}}")
     turns = defined(f"{label}.turns", whole, "1", f"Turns of {words} in a turn of the driver", f"n_{{{mark}}}")
     left_out = 2 * sp.pi * sp.floor(about.symbol / (2 * sp.pi) + sp.Rational(1, 2))
-    text = f"Whole turns left out of the excess of {words}"
-    less = defined(f"{label}.left_out", left_out, "rad", text, f"L_{{{mark}}}")
+    less = defined(f"{label}.left_out", left_out, "rad", f"Whole turns that {words} leave out", f"L_{{{mark}}}")
     setting.constants.extend((turned, rest, about, turns, less))
     return (nearest(direction, about.symbol) if linkage.drive.swings is None else angle) - less.symbol
