@@ -62,6 +62,7 @@ class Visitor:
         self._is_constant: dict[sp.Basic, bool] = {}
         self._is_own: dict[sp.Basic, bool] = {}
         self._ideals: dict[object, Visitor] = {}
+        self._outside = self  # of one at an angle of the ideal linkage, which its means and turns do not depend on
         self._agm: dict[sp.Basic, tuple[ca.SX, ca.SX]] = {}
 
     def child(self, values: Mapping[sp.Symbol, ca.SX], definitions: Mapping[sp.Symbol, sp.Expr]) -> Visitor:
@@ -177,7 +178,7 @@ class Visitor:
         if isinstance(expression, sp.elliptic_k | sp.elliptic_e):
             return self._elliptic(expression)
         if isinstance(expression, OF_IDEAL_LINKAGE):
-            return self._ideal(expression)
+            return self._ideal(expression) if self._outside is self else self._outside(expression)
         if isinstance(expression, ellipticity):
             return _ellipticity(self(expression.args[0]))
         function = _FUNCTIONS.get(expression.func)
@@ -263,6 +264,7 @@ class Visitor:
             if (of, angle, closed) not in self._ideals:
                 held = {of: self(angle)} | {position: ca.SX(0.0) for position in closed}
                 self._ideals[of, angle, closed] = self.child(held, self._definitions)
+                self._ideals[of, angle, closed]._outside = self
             return self._ideals[of, angle, closed]
 
         if isinstance(expression, Ideal):
