@@ -285,9 +285,8 @@ def _bounded(pair: Sensitivity) -> bool:
 
 
 def _title(quantity: QuantityValue, described: str, noun: str) -> str:
-    words = f"{described}\n{quantity.name} = {quantity.value:.6g} {printed_unit(quantity.unit)}".lstrip().removesuffix(
-        " 1"
-    )
+    words = f"{described}\n{quantity.name} = {quantity.value:.6g} {printed_unit(quantity.unit)}"
+    words = words.strip().removesuffix(" 1")
     if quantity.time is not None:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:
