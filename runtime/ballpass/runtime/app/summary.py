@@ -36,7 +36,7 @@ from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.kinds.drive_work import whole_cycles
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.ratings.of_bearing import contact_cosine, radial_gap
+from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap
 from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.run.failure_location import ring_distances
@@ -110,17 +110,17 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
     values = model.numbers(sol.parameters).values
-    summary["limits"] = list(limits_of_model(manifest, values, _moved(steady, summary)))
+    summary["limits"] = list(limits_of_model(manifest, values, _moved(steady, summary, values)))
     summary["warnings"] = [*unusual(manifest, values), *found]
     return summary
 
 
-def _moved(sol: Solution, summary: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Highest acceleration between samples of each bearing's inner ring [m/s^2] and its highest ball force [N]."""
+def _moved(sol: Solution, summary: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Highest acceleration between samples of inner rings loaded one-way [m/s^2], and highest ball force [N]."""
     found = {}
     for bearing in sol.manifest.bearings:
         peak = summary.get(f"{bearing.prefix}peak_ball_force", {})
-        if bearing.joint and "total" in peak:
+        if bearing.joint and inner_ring_mass(bearing, values) is not None and "total" in peak:
             speeds = [np.diff(sol[f"{bearing.prefix}inner.v{axis}"]) for axis in "xy"]
             found[bearing.path] = float(np.max(np.hypot(*speeds) / np.diff(sol.t))), peak["total"]
     return found
