@@ -21,7 +21,7 @@ from quick_cases import long_but
 
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.bearing.laws import LAWS
-from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR, Contact, SmoothedRest
+from ballpass.derive.bearing.laws.contact import SMOOTHED_HERTZ_ERROR, Contact, SmoothedRest
 from ballpass.derive.bearing.switching import Switching, find_switching
 from ballpass.derive.lowering.functions import lower
 from ballpass.derive.lowering.visitor import Visitor
@@ -182,7 +182,7 @@ def test_outside_the_widths_the_smoothed_law_is_the_law(law: str) -> None:
     if LAWS[law].kinked_at_rest:
         rate = np.linspace(-2 * rest, 2 * rest, 4001)
         error = table(damping, np.column_stack([np.full_like(rate, 1e-6), rate]))[0] - c * np.maximum(rate, 0.0)
-        assert np.max(error) == pytest.approx(RAMP_ERROR * c * rest, rel=1e-9)
+        assert np.max(error) == pytest.approx(5.0 / 32.0 * c * rest, rel=1e-9)
 
 
 def test_a_gate_opens_within_the_width() -> None:

@@ -67,28 +67,45 @@ def test_same_content_at_another_place_is_the_same_library(
 ) -> None:
     other = tmp_path / "other.c"
     other.write_text(SOURCE)
-    assert compile.library_key((source,), counting[0]) == compile.library_key((other,), counting[0])
+    assert compile.library_key([each.read_bytes() for each in (source,)], counting[0]) == compile.library_key(
+        [each.read_bytes() for each in (other,)], counting[0]
+    )
 
 
 def test_content_flags_compiler_versions_and_processor_all_enter_the_key(
     cache: Path, source: Path, counting: tuple[compile.Compiler, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compiler, _ = counting
-    keys = [compile.library_key((source,), compiler)]
-    keys.append(compile.library_key((source,), replace(compiler, flags=(*compiler.flags, "-O3"))))
-    keys.append(compile.library_key((source,), replace(compiler, identity="cc 99")))
-    keys.append(compile.library_key((source, source), compiler))
+    keys = [compile.library_key([each.read_bytes() for each in (source,)], compiler)]
+    keys.append(
+        compile.library_key(
+            [each.read_bytes() for each in (source,)], replace(compiler, flags=(*compiler.flags, "-O3"))
+        )
+    )
+    keys.append(compile.library_key([each.read_bytes() for each in (source,)], replace(compiler, identity="cc 99")))
+    keys.append(
+        compile.library_key(
+            [
+                each.read_bytes()
+                for each in (
+                    source,
+                    source,
+                )
+            ],
+            compiler,
+        )
+    )
     with monkeypatch.context() as patch:
         patch.setattr(compile, "_processor", lambda: "another")
-        keys.append(compile.library_key((source,), compiler))
+        keys.append(compile.library_key([each.read_bytes() for each in (source,)], compiler))
     with monkeypatch.context() as patch:
         patch.setattr(compile.importlib.metadata, "version", lambda name: "0")
-        keys.append(compile.library_key((source,), compiler))
+        keys.append(compile.library_key([each.read_bytes() for each in (source,)], compiler))
     with monkeypatch.context() as patch:
         patch.setattr(compile, "__version__", "0")
-        keys.append(compile.library_key((source,), compiler))
+        keys.append(compile.library_key([each.read_bytes() for each in (source,)], compiler))
     source.write_text(SOURCE.replace("2.0", "3.0"))
-    keys.append(compile.library_key((source,), compiler))
+    keys.append(compile.library_key([each.read_bytes() for each in (source,)], compiler))
     assert len(set(keys)) == len(keys) == 8
 
 

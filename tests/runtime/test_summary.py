@@ -23,10 +23,14 @@ from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.report.html import table_html
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
-from ballpass.runtime.report.text import show, table_text
+from ballpass.runtime.report.text import show, to_text
 from ballpass.runtime.solution.settle import look_beyond
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
+
+
+def table_text(table: ReportTable, width: int = 80) -> str:
+    return to_text(Report(parts=(table,)), width)
 
 
 @pytest.fixture(scope="module")

@@ -147,7 +147,7 @@ def compile_sources(
     compiler = replace(compiler, flags=(*compiler.flags, *flags))
     contents = {path: _content(path, digests or {}) for path in (*sources, *headers)}
     contents |= {Path(name): text.encode() for name, text in (made_headers or {}).items()}
-    key = _key(list(contents.values()), compiler)
+    key = library_key(list(contents.values()), compiler)
     name = f"{_file_name(label)}-{key[:32]}"
     ready = _find(cache_folder(), name)
     if ready is not None:
@@ -261,12 +261,8 @@ def _clear(folder: Path) -> None:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-def library_key(sources: Sequence[Path], compiler: Compiler) -> str:
-    """sha256 over content of the sources, compiler, flags, versions, system and processor."""
-    return _key([_content(path, {}) for path in sources], compiler)
-
-
-def _key(contents: Sequence[bytes], compiler: Compiler) -> str:
+def library_key(contents: Sequence[bytes], compiler: Compiler) -> str:
+    """sha256 over contents of sources, compiler, flags, versions, system and processor."""
     digest = hashlib.sha256()
     facts = (
         compiler.identity,

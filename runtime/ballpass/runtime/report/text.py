@@ -44,11 +44,6 @@ def show(report: Report) -> None:
         print(to_text(report))
 
 
-def table_text(table: ReportTable, width: int = WIDTH) -> str:
-    """A table alone."""
-    return to_text(Report(parts=(table,)), width)
-
-
 def _print(report: Report, console: Console) -> None:
     if report.title:
         console.print(_plain(report.title, "bold"), highlight=False)

@@ -25,9 +25,6 @@ import sympy as sp
 #: Largest error of the smoothed Hertz law over k_b w^1.5: maximum of ramp(z)^1.5 - z_+^1.5 for w = 1, rounded up.
 SMOOTHED_HERTZ_ERROR = 0.0668
 
-#: Largest error of `ramp` over w, met at zero.
-RAMP_ERROR = 5.0 / 32.0
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
