@@ -64,15 +64,15 @@ def equations(system: System) -> str:
     >>> page.splitlines()[2]
     '# Derived equations: rotor'
     """
-    tex = _Printer(system)
+    tex, parameters = _Printer(system), system.parameters
     parts = [
         HEADER,
         f"# Derived equations: {system.scene.name}",
         "Frame: x right, y up, angles counter-clockwise from +x. SI units. Equation numbers are those of the paper.",
         *_table_of(
             "Parameters",
-            ("symbol", "name", "unit", "meaning"),
-            ((f"${p.latex}$", f"`{p.name}`", _unit(p.unit), p.description) for p in system.parameters),
+            ("symbol", "name", "value", "unit", "meaning"),
+            ((f"${p.latex}$", f"`{p.name}`", f"{p.default:.7g}", _unit(p.unit), p.description) for p in parameters),
         ),
     ]
     if system.states:
