@@ -254,7 +254,10 @@ def save(figure: Figure, path: Path) -> Path:
 
 def _fit(figure: Figure) -> None:
     """Wrap titles and labels that are longer than their axes, and legends in as many columns as there is room for."""
-    for legend in list(figure.legends):
+    outside = (
+        legend for axes in figure.axes if (legend := axes.get_legend()) and legend.get_bbox_to_anchor() is not axes.bbox
+    )
+    for legend in [*figure.legends, *outside]:
         handles = [handle for handle in legend.legend_handles if handle is not None]
         words = [text.get_text() for text in legend.get_texts()]
         legend.remove()
@@ -269,7 +272,7 @@ def _fit(figure: Figure) -> None:
     for axes in figure.axes:
         width, height = axes.bbox.size
         while sum(text.get_window_extent().width + 4 for text in axes.get_xticklabels() if text.get_text()) > width:
-            axes.set_xticks(axes.get_xticks()[::2])
+            axes.set(xticks=axes.get_xticks()[::2], xlim=axes.get_xlim())  # ticks beyond the limits would move them
         titles = [axes.get_title(loc=where) for where in ("left", "center", "right")]
         own = [child for child in axes.get_children() if isinstance(child, Text) and child.get_text()]
         notes = [text for text in own if text.get_text() in titles or text.get_text().count(" ") > 3]

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
+from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
 from ballpass.runtime.quantity.characteristic import CharacteristicLine
 from ballpass.runtime.vibration.diagnosis import Spectrogram
@@ -126,9 +127,10 @@ def draw_spectrogram(
         axes.plot(found.time, mark.frequency * speed, label=mark.label, **_LOOKS.get(mark.name, _LOOKS["shaft"]))
     if orders:
         axes.legend(ncols=min(len(orders), 5), **_ABOVE)
-    axes.set_ylim(0.0, float(found.frequency[-1]))
-    bar = figure.colorbar(picture, ax=axes, pad=0.02)
-    bar.set_label(f"log10 of amplitude over {np.max(found.amplitude):.3g} {unit}")
+    highest = [SHOWN * mark.frequency * float(np.max(speed)) for mark in orders]
+    axes.set_ylim(0.0, min(float(found.frequency[-1]), max(highest, default=np.inf)))
+    bar, (factor, shown) = figure.colorbar(picture, ax=axes, pad=0.02), table_unit(unit)
+    bar.set_label(f"log10 of amplitude over {factor * np.max(found.amplitude):.3g} {shown}")
     lines = found.frequency[1] - found.frequency[0]
     frame(figure, title, f"Segments of {1.0 / lines:.3g} s, lines {lines:.3g} Hz apart.", left=0.9)
     return figure

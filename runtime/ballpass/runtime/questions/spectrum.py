@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -283,7 +284,7 @@ def _check(values: Mapping[str, Any]) -> None:
 
 
 def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Iterator[tuple[str, Figure]]:
-    from ballpass.runtime.plot.style import label, unit_words
+    from ballpass.runtime.plot.style import label
     from ballpass.runtime.plot.vibration import draw_lines, draw_spectrogram
 
     solution, band = found.solution, found.envelope
@@ -306,7 +307,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
         if orders:
             rate = np.gradient(_angle(solution), solution.t)
             speed = np.abs(np.interp(over_time.time, solution.t, rate)) / (2.0 * np.pi)
-        yield "spectrogram", draw_spectrogram(over_time, orders, speed, title=title, unit=unit_words(found.unit))
+        yield "spectrogram", draw_spectrogram(over_time, orders, speed, title=title, unit=found.unit)
         return
     factor, shown = table_unit(found.height_unit)
     figure = draw_lines(
@@ -321,12 +322,21 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     yield "spectrum", figure
 
 
+def _files(found: SignalSpectrum) -> Mapping[str, bytes]:
+    text = io.BytesIO()
+    across = "order [1]" if found.orders else "frequency [Hz]"
+    heads = f"{across},{found.scaling} of {found.of} [{found.height_unit}]"
+    np.savetxt(text, np.column_stack([found.position, found.height]), "%.9g", ",", header=heads, comments="")
+    return {"spectrum.csv": text.getvalue()}
+
+
 @Question(
     stage="computing the spectrum",
     samples=True,
     needs="scipy",
     check=_check,
     figures=_figures,
+    files=_files,
     always=True,
     takes_runs=True,
     digits=True,

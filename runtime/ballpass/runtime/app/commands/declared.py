@@ -342,7 +342,7 @@ def _place(
         formats = ()
     if folder is None or (question.always and not formats):
         return None, ()
-    kinds = (*formats, *(("nc",) if question.files else ()))
+    kinds = (*formats, *(("nc", "csv") if question.files else ()))
     check_folder(folder, f"{question.name}.json", f"{question.name}.md", *(f"*.{kind}" for kind in kinds))
     return folder, formats
 
