@@ -28,6 +28,7 @@ from ballpass.runtime.motion.forcing_period import (
 )
 from ballpass.runtime.motion.lyapunov import (
     REPEATED,
+    Exponent,
     changes_after,
     common_round,
     kind_of_motion,
@@ -118,21 +119,24 @@ class Strobe:
         rtol: float | None,
         *,
         follows: bool,
-    ) -> str:
-        """Name of the motion of a run that `sample_times` are among the times of, as `kind_of_motion` gives it.
+        readings: int,
+    ) -> tuple[str, Exponent | None]:
+        """Name of the motion of a run that `sample_times` are among the times of, and the exponent that gave it.
 
-        Where its states do not tell, `READ` more readings give the exponent.
+        The name is as of `kind_of_motion`. Where states do not tell it, `READ` more readings give the exponent, and as
+        many as the run has where these are too few.
 
         Parameters
         ----------
         begin : from which time on readings count [s]
         rtol : of the tangents; None: as `bifurcation` takes it
         follows : whether the state at an angle is a function of where the balls stand; no exponent is asked for then
+        readings : of the run
         """
         drifts, magnitude = self.drifts(model, parameters), np.array(run.statistics.magnitudes)
         if self.period is None and follows:
             rounds = common_round(drifts)
-            return f"periodic {rounds}" if rounds else "quasi-periodic"
+            return f"periodic {rounds}" if rounds else "quasi-periodic", None
         if self.period is not None:
             states = run.x[np.searchsorted(run.t, self.sample_times(model, parameters, begin, float(run.t[-1])))]
             found = (
@@ -140,21 +144,20 @@ class Strobe:
             )
             repeats = found[0] if found is not None else period_of(states, magnitude)
             if repeats:
-                return f"periodic {repeats}"
+                return f"periodic {repeats}", None
+        kind, grown = "undecided", None
         if not model.has_stepper or jumping_laws(model.manifest):
-            return "undecided"
-        states, flows = strobe_with_tangents(
-            model,
-            model.numbers(parameters),
-            run.end,
-            self.time(model, parameters),
-            READ,
-            magnitude,
-            EXPONENT_RTOL if rtol is None else rtol,
-            lambda: None,
-        )
-        grown = largest_exponent(flows, states, magnitude, drifts)
-        return kind_of_motion(states, magnitude, grown, drifts, forced=self.period is not None)[0]
+            return kind, grown
+        numbers, step = model.numbers(parameters), self.time(model, parameters)
+        tight = EXPONENT_RTOL if rtol is None else rtol
+        for count in (READ, readings):
+            if kind == "undecided" and count >= READ:
+                states, flows = strobe_with_tangents(
+                    model, numbers, run.end, step, count, magnitude, tight, lambda: None
+                )
+                grown = largest_exponent(flows, states, magnitude, drifts)
+                kind = kind_of_motion(states, magnitude, grown, drifts, forced=self.period is not None)[0]
+        return kind, grown
 
     def sample_times(self, model: LoadedModel, parameters: Mapping[str, float], begin: float, end: float) -> np.ndarray:
         """Times between two others at which states are read, the last `READ` of them [s]."""

@@ -1,4 +1,4 @@
-"""A Poincaré section of a long run: states once a turn, and the closed curve on which they lie where there is one.
+"""A Poincaré section of a long run: states once a turn or a period, and the closed curve where they lie on one.
 
 Of an engine, whose loads repeat after two turns, they are read once in two.
 
@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from ballpass.runtime.contract.defaults import SECTION_RTOL
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option, Rtol
 from ballpass.runtime.contract.units import table_unit
 from ballpass.runtime.questions.bifurcation import State
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ballpass.runtime.motion.invariant_curve import InvariantCurve
+    from ballpass.runtime.motion.lyapunov import Exponent
 
 #: Largest distance of points from a curve on which they lie, of any state, in shares of the points' spread.  A chaotic
 #: press at a loaded angle comes as near as 0.08 [1].
@@ -43,8 +45,15 @@ FEW = 16
 #: Rounds of a curve, and moments at which what turns is sought.
 PITCH, CAGE, MOMENTS = "ball pitch", "turn of the cage", 40
 
-Section = Annotated[int, Option(words="Turns of which a point is kept.", shown="N", least=40, most=1_000_000)]
-Dropped = Annotated[int, Option(words="Turns at the start that do not count.", shown="N", least=0, most=1_000_000)]
+Section = Annotated[int, Option(words="Points.", shown="N", least=40, most=1_000_000)]
+Dropped = Annotated[int, Option(words="Points at the start that do not count.", shown="N", least=0, most=1_000_000)]
+Once = Annotated[
+    Literal["turn", "period"],
+    Option(
+        words="A point is taken once a turn, or once in a period of the equations, as `bifurcation` reads them: where "
+        "loads are constant, each time a ball passes."
+    ),
+]
 At = Annotated[
     float | None,
     Option(
@@ -66,13 +75,14 @@ class PoincareSection(ShortRepr, Reported):
     row : of the state that is shown
     angle : of driver or shaft since t = 0 [deg]
     states : points, shape (readings, states)
-    turns : of driver or shaft from point to point: one, or as many as all loads repeat after
+    turns : of driver or shaft from point to point: one, or as many as all loads repeat after; 0 for a period
     phase : where the balls stand at each point, in parts of `around` from 0 to 1, shape (readings,) [1]
     around : what a round of the curve is: a ball pitch, or a turn of the cage where balls differ
-    period : turns after which points repeat; 0 where they do not
+    period : turns after which points repeat, or points where one is taken in a period; 0 where they do not
     curve : fitted over `phase`; None where points repeat, or where more turns than one cage
     others : what turns at a rate of its own besides
     motion, every : name of the motion as `bifurcation` gives it, and the time between its readings in words
+    exponent : largest Lyapunov exponent per reading, where the motion is named by it
 
     Examples
     --------
@@ -95,6 +105,7 @@ class PoincareSection(ShortRepr, Reported):
     others: tuple[str, ...]
     motion: str
     every: str
+    exponent: Exponent | None
 
     @property
     def often(self) -> str:
@@ -105,7 +116,7 @@ class PoincareSection(ShortRepr, Reported):
         >>> model.section(readings=40).often
         'one a turn'
         """
-        return "one a turn" if self.turns == 1 else f"one in {self.turns} turns"
+        return {0: f"one {self.every}", 1: "one a turn"}.get(self.turns, f"one in {self.turns} turns")
 
     @property
     def kind(self) -> str:
@@ -117,7 +128,9 @@ class PoincareSection(ShortRepr, Reported):
         'repeats after 1 turn'
         """
         if self.period:
-            return f"repeats after {self.period} turn{'' if self.period == 1 else 's'}"
+            return f"repeats after {self.period} {'turn' if self.turns else 'point'}{'' if self.period == 1 else 's'}"
+        if not self.turns:
+            return self.motion
         if self.curve is None:
             own = f"{' and '.join(self.others)} turn" + (
                 " at rates of their own" if self.others[1:] else "s at its own rate"
@@ -151,7 +164,8 @@ class PoincareSection(ShortRepr, Reported):
             },
             title=f"{len(self.states)} points, {self.often}, at {self.angle:g} deg: {self.kind}",
         )
-        parts: list[str | ReportTable] = [table, f"Motion: {self.motion}, read {self.every}."]
+        grown = f"; largest exponent per reading {self.exponent.words}" if self.exponent else ""
+        parts: list[str | ReportTable] = [table, f"Motion: {self.motion}, read {self.every}{grown}."]
         if self.curve is not None:
             drift = self.curve.drift
             around = f", so that they go round once in {self.turns / abs(drift):.4g} turns" if drift else ""
@@ -169,10 +183,12 @@ class PoincareSection(ShortRepr, Reported):
         elif self.kind == "on no smooth curve":
             parts.append(
                 "The motion is chaotic, not settled, or its curve is finer than these points resolve: its name is that "
-                "of its Lyapunov exponent. Take more points or another angle (at)."
+                "of its Lyapunov exponent. Take more points, of which the exponent has as many, or another angle (at)."
             )
         facts = {
             **self._named("angle", "turns", "around", "others", "kind", "period", "motion", "every"),
+            "exponent": self.exponent.mean if self.exponent else None,
+            "exponent_half": self.exponent.half if self.exponent else None,
             "drift": self.curve.drift if self.curve is not None else None,
             "harmonics": self.curve.harmonics if self.curve is not None else None,
             "units": {"angle": "deg", "period": "turns", "points": "SI"},
@@ -189,7 +205,7 @@ def _figures(_model: AnyModel, found: PoincareSection, _parameters: object) -> I
     curve = found.curve if found.kind == "on a closed curve" else None
     words = f"{len(found.states)} points, {found.often}, {found.angle:g} degrees after t = 0: {found.kind}."
     names = found.names, found.units, found.row
-    yield "section", draw_section(found.states, found.phase, found.around, *names, curve, words)
+    yield "section", draw_section(found.states, found.phase, found.around if found.turns else "", *names, curve, words)
 
 
 @Question(samples=True, figures=_figures, requires="bearings")
@@ -200,13 +216,15 @@ def section(
     readings: Section = 400,
     settling: Dropped = 50,
     at: At = None,
+    once: Once = "turn",
     parameters: Mapping[str, float] | None = None,
     rtol: Rtol = None,
     progress: Progress = None,
 ) -> PoincareSection:
     """Take the Poincaré section of a long run, and fit the closed curve on which its points lie.
 
-    A state is read once a turn, always at the same angle; of an engine whose loads repeat after two turns, once in two.
+    A state is read once a turn, always at the same angle; of an engine whose loads repeat after two turns, once in two;
+    or once in a period of the equations.
     Points that repeat belong to a periodic motion, points on a closed curve to a quasi-periodic one. The curve is a
     Fourier series over the place of the balls; every second point is left out of the fit and judges it.
 
@@ -218,7 +236,8 @@ def section(
     Raises
     ------
     RequestError
-        An unknown state, a scene without states, one in which nothing turns, or one whose driver's motion is a state.
+        An unknown state, a scene without states, one in which nothing turns, one whose driver's motion is a state, or
+        points once a period where none is as short as eight turns.
     IntegrationError
         The computation failed.
 
@@ -243,10 +262,15 @@ def section(
     refuse_free_driver(manifest, "section")
     strobe = strobe_of(model, given, (), "section")
     names = tuple(info.name for info in manifest.states)
+    step, by_turns = turn * turns, once == "turn"
+    if not by_turns:
+        if strobe.period is None:
+            raise RequestError("section: these equations have no period of eight turns or less. Allowed: once = turn.")
+        step, turns = strobe.time(model, given), 0
     state = of or ("inner.y" if "inner.y" in names else names[0])
     angle = 0.0 if at is None else at
-    times = alike + turn * (turns * (settling + np.arange(1, readings + 1)) + angle / 360.0)
-    begin, end = alike + turn * turns * settling, float(times[-1])
+    times = alike + step * (settling + np.arange(1, readings + 1)) + turn * angle / 360.0
+    begin, end = alike + step * settling, float(times[-1])
     every = np.union1d(times, strobe.sample_times(model, given, begin, end))
     with shown("taking points", progress):
         run = model.simulate(
@@ -260,10 +284,10 @@ def section(
         )
     states = run.x[np.searchsorted(run.t, times)]
     magnitude = np.array(run.statistics.magnitudes)
-    period = turns * period_of(states, magnitude, FEW)
+    period = (turns or 1) * period_of(states, magnitude, FEW)
     phase, around, curve = np.zeros(readings), bearing_words(PITCH, manifest.bearings), None
     others: tuple[str, ...] = ()
-    if len(manifest.bearings) == 1:
+    if by_turns and len(manifest.bearings) == 1:
         pick = np.linspace(0, readings - 1, MOMENTS).astype(int)
         others = tuple(own_phases(model, numbers, times[pick], states[pick], turns * turn))
         first = [float(ball_angles(model, numbers, t, x)[0][0]) for t, x in zip(times.tolist(), states, strict=True)]
@@ -277,6 +301,7 @@ def section(
                 phase, around, curve = rounds, CAGE, whole
     follows = curve is not None and bool(np.max(curve.missed) <= ON_CURVE)
     follows = follows or bool(period_of(states, magnitude))  # a longer period than that of few points
+    motion, grown = strobe.name_of(model, given, run, begin, rtol, follows=follows, readings=readings)
     return PoincareSection(
         names=names,
         units=tuple(info.unit for info in manifest.states),
@@ -290,6 +315,7 @@ def section(
         period=period,
         curve=curve,
         others=others,
-        motion=strobe.name_of(model, given, run, begin, rtol, follows=follows),
+        motion=motion,
         every=strobe.every,
+        exponent=grown,
     )
