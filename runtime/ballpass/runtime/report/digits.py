@@ -39,6 +39,9 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 #: But for times and angles of a peak, which may be as high elsewhere.
 _PLUS_MINUS = re.compile(rf"({_NUMBER.pattern})\s±({_NUMBER.pattern})(?! s\b| deg\b)")
 
+#: A place whose element is another in each answer: the time and angle beside it say nothing either.
+_NOWHERE = re.compile(r"\([a-z]+ -?\d+ ±\d+ at [^()]*\)")
+
 
 def second_tolerance(rtol: float) -> float:
     """Tolerance of the answer that one is compared with: a tighter one, or a looser where that is not to be had [1]."""
@@ -112,7 +115,8 @@ def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) ->
     numbers = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
     between = between if len(words) == 2 and len("".join(words)) < 2 else " "  # with a star at most
     found = [_shared_number(each, between, least) for each in numbers]
-    return "".join(part for pair in zip(words, [*found, ""], strict=True) for part in pair)
+    joined = "".join(part for pair in zip(words, [*found, ""], strict=True) for part in pair)
+    return _NOWHERE.sub("(elsewhere at each tolerance)", joined)
 
 
 def _shared_number(texts: Sequence[str], between: str, least: int) -> str:
