@@ -31,21 +31,12 @@ from ballpass.derive.reading.values import parse_override, replaced, value_fault
 from ballpass.derive.scene.bearing_records import Bearing, InitialState
 from ballpass.derive.scene.errors import Fault, LinkageError, SceneError
 from ballpass.derive.scene.file_columns import with_columns
+from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
-from ballpass.derive.scene.records import (
-    FRAME,
-    OUTPUTS,
-    HarmonicLoad,
-    Load,
-    Mechanism,
-    RunSettings,
-    Scene,
-    Shaft,
-    UnbalanceLoad,
-    quantities_of,
-)
+from ballpass.derive.scene.records import OUTPUTS, RunSettings, Scene, quantities_of
+from ballpass.derive.scene.shaft_records import HarmonicLoad, Load, Shaft, UnbalanceLoad
 from ballpass.derive.scene.shipped import shipped_scenes
-from ballpass.derive.scene.table import Collector, Table, listing
+from ballpass.derive.scene.table import FRAME, Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names, names_of
