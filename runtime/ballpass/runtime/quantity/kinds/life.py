@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import SECTORS, TURNED
+from ballpass.runtime.quantity.cuts import PLACES
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import KILO, ElementLife, raceway_life
@@ -27,9 +28,6 @@ Array = NDArray[np.float64]
 
 #: A number or an array, and its derivative, with an axis of directions behind.
 Dual = tuple[float | Array, Array]
-
-#: Angle of ball 1 as the rings see it, outer and inner, behind the bearing's prefix.
-PLACES = ("cage.in_outer", "cage.in_inner")
 
 #: Rate at Gauss's nodes of what has values there, over the part of a panel: that of the polynomial through them.
 _POWERS = np.vander(GAUSS, increasing=True)
