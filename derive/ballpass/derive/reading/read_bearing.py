@@ -18,7 +18,6 @@ from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.bearing_records import (
     BallEffect,
     Bearing,
-    Catalogue,
     Damping,
     EquivalentMass,
     InitialState,
@@ -28,6 +27,7 @@ from ballpass.derive.scene.bearing_records import (
 from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
 from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
+from ballpass.derive.scene.rating_records import Catalogue
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
 from ballpass.derive.scene.shaft_records import Shaft
 from ballpass.derive.scene.table import FRAME, Table, listing, suggest

@@ -19,7 +19,7 @@ from ballpass.derive.mechanism.forces import FORCE_TABLES, ForceTable
 from ballpass.derive.reading import read_bearing, read_cage, read_coupling, read_load, read_mechanism
 from ballpass.derive.reading.read_designation import DESIGNATION
 from ballpass.derive.reading.read_fit import Fit
-from ballpass.derive.scene import bearing_records, mechanism_records, records, shaft_records
+from ballpass.derive.scene import bearing_records, mechanism_records, rating_records, records, shaft_records
 from ballpass.derive.scene.keys import Fill, Key
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of
 
@@ -124,13 +124,13 @@ def _bearing() -> Iterator[Section]:
     yield _of(
         "bearing",
         bearing_records.Bearing,
-        bearing_records.Catalogue,
+        rating_records.Catalogue,
         designation=DESIGNATION,
         element=read_bearing.ELEMENT,
     )
     yield _of("bearing.fit", Fit)
-    yield _of("bearing.lubrication", bearing_records.Lubrication)
-    yield _of("bearing.alignment", bearing_records.Alignment)
+    yield _of("bearing.lubrication", rating_records.Lubrication)
+    yield _of("bearing.alignment", rating_records.Alignment)
     for element in ELEMENTS.values():
         if element.derived is not element.given:
             yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)

@@ -17,10 +17,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar
 
-from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.keys import ChoiceKey, NamesKey, TextKey, WholeKey
 from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
+from ballpass.derive.scene.rating_records import Catalogue, Lubrication
 from ballpass.derive.scene.read_keys import Either, not_negative, positive, quantity
 from ballpass.derive.scene.shaft_records import Load, Shaft
 from ballpass.derive.scene.toml_lines import LineIndex

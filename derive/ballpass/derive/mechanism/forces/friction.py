@@ -30,17 +30,10 @@ class Friction(Law):
     one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("viscous",), ("AMOUNT",)), several=True),)
 
     viscous: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT*s/SIZE_UNIT",
-        "Viscous friction of NAME",
-        "c_{INDEX}",
-        "0.1 AMOUNT_UNIT*s/SIZE_UNIT",
+        "AMOUNT_UNIT*s/SIZE_UNIT", "Viscous friction of NAME", "c_{INDEX}", "0.1 AMOUNT_UNIT*s/SIZE_UNIT"
     )
     coulomb: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT",
-        "Coulomb friction of NAME",
-        "F_{c,INDEX}",
-        "2 AMOUNT_UNIT",
-        name="AMOUNT",
+        "AMOUNT_UNIT", "Coulomb friction of NAME", "F_{c,INDEX}", "2 AMOUNT_UNIT", name="AMOUNT"
     )
     smoothing: SceneNumber | None = positive(
         "SIZE_UNIT/s",
