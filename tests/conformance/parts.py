@@ -21,8 +21,8 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.drive.laws import LAWS as DRIVES
 from ballpass.derive.mechanism.dyads import DYADS
 from ballpass.derive.mechanism.forces import FORCE_TABLES
+from ballpass.derive.scene.mechanism_records import Gear
 from ballpass.derive.scene.read_keys import keys_of
-from ballpass.derive.scene.records import Gear
 
 ROOT = Path(__file__).resolve().parents[2]
 

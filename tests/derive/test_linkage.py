@@ -30,7 +30,7 @@ from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import dot
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
 from ballpass.derive.scene.errors import LinkageError, SceneError
-from ballpass.derive.scene.records import Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 
 TURN = np.linspace(0.0, 2 * np.pi, 61)
 STEP = 1e-30  # of complex differentiation: no difference is taken, so no digits are lost

@@ -15,7 +15,8 @@ from ballpass.derive.reading.read import parse_override, read_scene, scene_from_
 from ballpass.derive.scene.bearing_records import EquivalentMass, GivenContact, HertzContact
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import HarmonicLoad, Scene, TableLoad
+from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.shaft_records import HarmonicLoad, TableLoad
 from ballpass.derive.scene.units import parse_quantity
 
 FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")

@@ -372,7 +372,7 @@ NAMED: dict[str, dict[str, str]] = {
     },
     "docs/reference/scene/friction.md": {"has 76 % of its amount": "tanh 1"},
     "docs/reference/scene/index.md": {"at most 64 characters": "table.py"},
-    "docs/reference/scene/run.md": {"which are 50 where": "read.py"},
+    "docs/reference/scene/run.md": {"which are 50 where": "read_tables.py"},
     "docs/reference/scene/shaft.md": {"at most 1000 rows": "file_columns.py"},
     "docs/reference/scene/stops.md": {"turned by 180°": "geometry"},
 }

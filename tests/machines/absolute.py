@@ -16,8 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.mechanism_records import Gear, Joint
 from ballpass.derive.scene.quantity import Vector
-from ballpass.derive.scene.records import FRAME, Gear, Joint, Scene
+from ballpass.derive.scene.records import Scene, quantities_of
+from ballpass.derive.scene.table import FRAME
 
 Array = np.ndarray
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -93,7 +95,7 @@ class Absolute:
         return 0.0 if quantity is None else self.values[quantity.path]  # type: ignore[attr-defined]
 
     def vector(self, vector: Vector, axis: tuple[float, float] = (1.0, 0.0)) -> Array:
-        numbers = [self.values[q.path] for q in vector.quantities()]
+        numbers = [self.values[q.path] for q in quantities_of(vector)]
         if not numbers:
             return np.zeros(2)
         if len(numbers) == 1:

@@ -13,8 +13,9 @@ from ballpass.derive import derive
 from ballpass.derive.lowering.functions import _Lowering
 from ballpass.derive.mechanism.forces import PointForce
 from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.scene.mechanism_records import NamedPoint
 from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.records import NamedPoint, Scene
+from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.derive.variables import Input
 from ballpass.runtime.time.turning import Turning
 
@@ -230,7 +231,7 @@ def linkage_text(machine: Machine) -> str:
         return f'"{float(values[quantity.path])!r} {"" if quantity.unit == "1" else quantity.unit}"'
 
     def vector(place: Vector) -> str:
-        numbers = [amount(q) for q in place.quantities()]
+        numbers = [amount(q) for q in quantities_of(place)]
         if len(numbers) < 2:
             return numbers[0] if numbers else '"origin"'
         if place.kind == "cartesian":

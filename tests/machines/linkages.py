@@ -15,8 +15,8 @@ from ballpass.derive.mechanism.forces import BodyTorque, ConstantForce, Forces, 
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
+from ballpass.derive.scene.mechanism_records import Body, Driver, Force, Gear, Joint, Mechanism, NamedPoint
 from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.records import Body, Driver, Force, Gear, Joint, Mechanism, NamedPoint
 from ballpass.derive.terms import TIME
 from ballpass.runtime.contract.manifest import TurningInfo
 

@@ -27,7 +27,8 @@ from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.scene.bearing_records import Bearing, GivenContact
-from ballpass.derive.scene.records import FRAME, Gear
+from ballpass.derive.scene.mechanism_records import Gear
+from ballpass.derive.scene.table import FRAME
 
 
 @dataclass

@@ -17,8 +17,11 @@ from ballpass.derive.lowering.functions import LoweredFunctions, lower, operatio
 from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
 from ballpass.derive.scene.errors import SceneError
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
+from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.shaft_records import ConstantLoad, Load, Shaft
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.system import derive
 from ballpass.runtime.ratings.elements import element_words
 
@@ -238,12 +241,7 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
             number = SceneNumber(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")
             inner = InnerRing(mass=number, damping=inner.damping)
         bearings.append(replace(bearing, inner=inner, joint=None, share=None))
-    return replace(
-        scene,
-        mechanism=None,
-        shaft=shaft,
-        bearings=tuple(bearings),
-    )
+    return replace(scene, mechanism=None, shaft=shaft, bearings=tuple(bearings))
 
 
 def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
@@ -262,12 +260,7 @@ def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
         path=f"{bearing.path}.inner_ring.mass", value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i"
     )
     loaded = replace(
-        bearing,
-        coupling="one-way",
-        inner_body="",
-        count=None,
-        share=share,
-        inner=InnerRing(mass=mass, damping=None),
+        bearing, coupling="one-way", inner_body="", count=None, share=share, inner=InnerRing(mass=mass, damping=None)
     )
     return _with(scene, loaded)
 

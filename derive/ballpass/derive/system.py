@@ -46,7 +46,8 @@ from ballpass.derive.requested import (
     ring_outputs,
 )
 from ballpass.derive.scene.errors import LinkageError, SceneError
-from ballpass.derive.scene.records import Mechanism, Scene
+from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.scene.records import Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, StateSwitch, Variable
 from ballpass.runtime.contract.arguments import typed

@@ -6,7 +6,8 @@ import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing, EquivalentMass
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import FRAME, Mechanism
+from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import components, symbol_of
 
 

@@ -21,8 +21,9 @@ from ballpass.derive.bearing.two_way import Coupled, ring
 from ballpass.derive.mechanism.kinematics import Ledger, Motion, add, displaced, dot, scale
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import CENTER_OF_MASS, Mechanism, Shaft
+from ballpass.derive.scene.shaft_records import Shaft
 from ballpass.derive.terms import Definition, defined, symbol_of
 from ballpass.derive.variables import Output
 

@@ -17,7 +17,8 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import ConstantLoad, HarmonicLoad, Load, LoadWindow, Scene, TableLoad, UnbalanceLoad
+from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.shaft_records import ConstantLoad, HarmonicLoad, Load, LoadWindow, TableLoad, UnbalanceLoad
 from ballpass.derive.terms import TIME, Definition, components, defined, symbol_of
 from ballpass.derive.variables import Input, Terms, turned
 from ballpass.runtime.contract.manifest import TurningInfo

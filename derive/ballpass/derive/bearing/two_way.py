@@ -33,7 +33,8 @@ from ballpass.derive.mechanism.kinematics import (
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.records import FRAME, Joint
+from ballpass.derive.scene.mechanism_records import Joint
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import components, symbol_of
 from ballpass.derive.variables import Coordinate
 

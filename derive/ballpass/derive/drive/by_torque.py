@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ballpass.derive.drive.angle_state import AngleState, driver_coordinate
-from ballpass.derive.scene.records import Driver
+from ballpass.derive.scene.mechanism_records import Driver
 from ballpass.derive.terms import Smoothness, defined, refuse_kinks, symbol_of
 
 

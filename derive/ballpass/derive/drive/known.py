@@ -14,8 +14,9 @@ import sympy as sp
 
 from ballpass.derive.drive.angle_state import driver_coordinate
 from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.scene.mechanism_records import Driver
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.records import Driver, Shaft
+from ballpass.derive.scene.shaft_records import Shaft
 from ballpass.derive.terms import TIME, Definition, defined, symbol_of
 from ballpass.derive.variables import DRIVER_ANGLE, Input, gate_of, turned
 from ballpass.runtime.contract.manifest import DRIVER_ACCELERATION, TurningInfo

@@ -12,7 +12,8 @@ from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
-from ballpass.derive.scene.records import FRAME, quantities_of
+from ballpass.derive.scene.records import quantities_of
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract import manifest as mf

@@ -13,7 +13,8 @@ from itertools import combinations
 from ballpass.derive.mechanism.dyads import DYADS, Dyad, Group
 from ballpass.derive.mechanism.gear import carriers, next_gear
 from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.records import FRAME, Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import Joint, Mechanism
+from ballpass.derive.scene.table import FRAME
 
 #: Most bodies of an Assur group that is named.
 LARGEST_GROUP = 8

@@ -27,7 +27,8 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Joint, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import components, symbol_of
 
 #: Torque of the drive on the driven body [N*m], counter-clockwise.

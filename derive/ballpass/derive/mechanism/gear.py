@@ -37,7 +37,8 @@ from ballpass.derive.mechanism.kinematics import (
     subtract,
 )
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import FRAME, Gear, Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import Gear, Joint, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Words
 

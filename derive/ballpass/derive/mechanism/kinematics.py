@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Body, Joint, Mechanism
 from ballpass.derive.scene.quantity import Vector
-from ballpass.derive.scene.records import CENTER_OF_MASS, FRAME, Body, Joint, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import Definition, components, symbol_of
 
 #: Plane vector: x and y components.
@@ -248,11 +249,7 @@ def place(
         f"acceleration of the centre of mass of {body}",
         rf"\ddot{{AXIS}}_{{o,{subscript(body)}}}",
     )
-    return replace(
-        bare,
-        origin=bare.motion(ZERO),
-        center_of_mass=replace(mass_point, acceleration=named),
-    )
+    return replace(bare, origin=bare.motion(ZERO), center_of_mass=replace(mass_point, acceleration=named))
 
 
 def frame_pose() -> Pose:

@@ -36,7 +36,8 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
 )
 from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.records import FRAME, Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import Joint, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import Definition
 
 #: Joints that keep their two points together.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import FRAME
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.scene.units import parse_quantity
 
 Coupling = Literal["one-way", "two-way"]

@@ -1,6 +1,6 @@
 """The tables [shaft] and [bearing] of a scene file to their records.
 
-In: the tables.  Out: records, possibly with placeholders where faults were noted (see `schema.py`).
+In: the tables.  Out: records, possibly with placeholders where faults were noted (see `table.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.bearing_records import (
     BallEffect,
     Bearing,
-    Catalogue,
     Damping,
     EquivalentMass,
     InitialState,
@@ -26,10 +25,12 @@ from ballpass.derive.scene.bearing_records import (
     OuterRing,
 )
 from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
+from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
+from ballpass.derive.scene.rating_records import Catalogue
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
-from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
-from ballpass.derive.scene.table import Table, listing, suggest
+from ballpass.derive.scene.shaft_records import Shaft
+from ballpass.derive.scene.table import FRAME, Table, listing, suggest
 from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.

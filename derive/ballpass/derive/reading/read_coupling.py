@@ -11,10 +11,10 @@ from typing import Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, InnerRing
 from ballpass.derive.scene.keys import TextKey
+from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import keys_of
-from ballpass.derive.scene.records import FRAME, Mechanism
-from ballpass.derive.scene.table import Table, listing, suggest
+from ballpass.derive.scene.table import FRAME, Table, listing, suggest
 from ballpass.derive.scene.units import show
 
 #: Key of the inner ring of a bearing coupled two-way.

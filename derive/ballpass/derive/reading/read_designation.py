@@ -10,9 +10,9 @@ from decimal import Decimal
 
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.reading.clearance_groups import no_group
-from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import GROUPS, BearingType, bearing_types
 from ballpass.derive.scene.keys import TextKey
+from ballpass.derive.scene.rating_records import Catalogue
 from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show

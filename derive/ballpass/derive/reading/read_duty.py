@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
-from ballpass.derive.scene.bearing_records import Alignment, Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.rating_records import Alignment, Lubrication
 from ballpass.derive.scene.read_keys import read_record
 from ballpass.derive.scene.records import DutyState, Scene
 from ballpass.derive.scene.table import Table, listing

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
 from ballpass.derive.scene.keys import ChoiceKey
 from ballpass.derive.scene.quantity import SceneNumber
+from ballpass.derive.scene.rating_records import Catalogue
 from ballpass.derive.scene.read_keys import Either, keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show

@@ -9,7 +9,7 @@ from typing import Any
 
 from ballpass.derive.scene.keys import ChoiceKey, PairKey, QuantityKey
 from ballpass.derive.scene.read_keys import keys_of, read_record
-from ballpass.derive.scene.records import ConstantLoad, HarmonicLoad, Load, LoadWindow, TableLoad, UnbalanceLoad
+from ballpass.derive.scene.shaft_records import ConstantLoad, HarmonicLoad, Load, LoadWindow, TableLoad, UnbalanceLoad
 from ballpass.derive.scene.table import Table
 
 #: Laws of a load by its type.

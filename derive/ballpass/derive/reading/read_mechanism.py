@@ -1,6 +1,6 @@
 """The table [mechanism] of a scene file to a `Mechanism`.
 
-In: the table.  Out: the record, possibly with placeholders where faults were noted (see `schema.py`).  Whether the
+In: the table.  Out: the record, possibly with placeholders where faults were noted (see `table.py`).  Whether the
 linkage can be assembled is checked later, by `derive`.
 """
 
@@ -16,11 +16,8 @@ from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_points
 from ballpass.derive.scene.keys import ChoiceKey, VectorKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
-from ballpass.derive.scene.read_keys import keys_of, number, read_record
-from ballpass.derive.scene.records import (
+from ballpass.derive.scene.mechanism_records import (
     CENTER_OF_MASS,
-    FRAME,
     POINT,
     POSITION,
     Body,
@@ -34,7 +31,9 @@ from ballpass.derive.scene.records import (
     OscillatingDriver,
     SpeedOverTime,
 )
-from ballpass.derive.scene.table import Table, listing, suggest, upright
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
+from ballpass.derive.scene.read_keys import keys_of, number, read_record
+from ballpass.derive.scene.table import FRAME, Table, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
 GRAVITY = VectorKey(
@@ -261,11 +260,8 @@ def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound
         return None
     names = [joint.name for joint in joints]
     joint = next((joint for joint in joints if joint.name == driver.joint), None)
-    problem, allowed, remedy = (
-        "",
-        'a revolute joint with bodies = ["frame", <driven body>]',
-        "name a joint of the frame",
-    )
+    problem, remedy = "", "name a joint of the frame"
+    allowed = 'a revolute joint with bodies = ["frame", <driven body>]'
     if joint is None:
         problem, allowed = f"there is no joint {show(driver.joint)}", listing(names)
         remedy = suggest(driver.joint, names, "name one of the joints")

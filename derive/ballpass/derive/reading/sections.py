@@ -19,7 +19,7 @@ from ballpass.derive.mechanism.forces import FORCE_TABLES, ForceTable
 from ballpass.derive.reading import read_bearing, read_cage, read_coupling, read_load, read_mechanism
 from ballpass.derive.reading.read_designation import DESIGNATION
 from ballpass.derive.reading.read_fit import Fit
-from ballpass.derive.scene import bearing_records, records
+from ballpass.derive.scene import bearing_records, mechanism_records, rating_records, records, shaft_records
 from ballpass.derive.scene.keys import Fill, Key
 from ballpass.derive.scene.read_keys import Either, choices_of, keys_of
 
@@ -70,7 +70,7 @@ def _variants(
 
 def _top() -> Iterator[Section]:
     yield _of("", records.Scene)
-    yield _of("shaft", records.Shaft)
+    yield _of("shaft", shaft_records.Shaft)
     yield _of("run", records.RunSettings, outputs=records.OUTPUTS)
     yield _of("duty.*", records.DutyState)
     yield Section(path=("duty", "*", "set"), keys={}, free=True)
@@ -78,20 +78,20 @@ def _top() -> Iterator[Section]:
 
 def _mechanism() -> Iterator[Section]:
     yield _of("mechanism", gravity=read_mechanism.GRAVITY)
-    yield _of("mechanism.driver", records.Driver, fill=read_mechanism.CONSTANT)
-    yield _of("mechanism.driver.range", records.DriverRange)
-    yield _of("mechanism.driver.swing", records.OscillatingDriver)
-    yield _of("mechanism.driver.table", records.SpeedOverTime)
+    yield _of("mechanism.driver", mechanism_records.Driver, fill=read_mechanism.CONSTANT)
+    yield _of("mechanism.driver.range", mechanism_records.DriverRange)
+    yield _of("mechanism.driver.swing", mechanism_records.OscillatingDriver)
+    yield _of("mechanism.driver.table", mechanism_records.SpeedOverTime)
     yield _of("mechanism.driver.flywheel", inertia=read_mechanism.FLYWHEEL)
     torques = {name: (keys_of(law), choices_of(law)) for name, law in TORQUE_LAWS.items()}
     yield from _variants("mechanism.driver.torque", read_mechanism.LAW, "law", torques)
-    points = {"*": records.POINT.filled(NAME)}
+    points = {"*": mechanism_records.POINT.filled(NAME)}
     yield Section(path=("mechanism", "frame", "points"), keys=points)
-    yield _of("mechanism.bodies.*", records.Body)
+    yield _of("mechanism.bodies.*", mechanism_records.Body)
     yield Section(path=("mechanism", "bodies", "*", "points"), keys=points)
-    yield Section(path=("mechanism", "bodies", "*", "positions"), keys={"*": records.POSITION.filled(NAME)})
-    yield _of("mechanism.joints.*", records.Joint, branch=read_mechanism.BRANCH)
-    yield _of("mechanism.gears.*", records.Gear)
+    yield Section(path=("mechanism", "bodies", "*", "positions"), keys={"*": mechanism_records.POSITION.filled(NAME)})
+    yield _of("mechanism.joints.*", mechanism_records.Joint, branch=read_mechanism.BRANCH)
+    yield _of("mechanism.gears.*", mechanism_records.Gear)
     for table in FORCE_TABLES:
         yield from _forces(table)
 
@@ -111,25 +111,26 @@ def _forces(table: ForceTable) -> Iterator[Section]:
 
 
 def _load() -> Iterator[Section]:
-    loads = {name: (keys_of(law) | keys_of(records.Load), choices_of(law)) for name, law in read_load.LOADS.items()}
+    common = keys_of(shaft_records.Load)
+    loads = {name: (keys_of(law) | common, choices_of(law)) for name, law in read_load.LOADS.items()}
     yield from _variants("load", read_load.TYPE, "type", loads)
     both = {"phase": read_load.components_of_phase()}
     yield from _variants("load", read_load.TYPE, "type", {"harmonic": (both, ())})
     for key, fill in read_load.WINDOWS.items():
-        yield _of(f"load.{key}", records.LoadWindow, fill=fill)
+        yield _of(f"load.{key}", shaft_records.LoadWindow, fill=fill)
 
 
 def _bearing() -> Iterator[Section]:
     yield _of(
         "bearing",
         bearing_records.Bearing,
-        bearing_records.Catalogue,
+        rating_records.Catalogue,
         designation=DESIGNATION,
         element=read_bearing.ELEMENT,
     )
     yield _of("bearing.fit", Fit)
-    yield _of("bearing.lubrication", bearing_records.Lubrication)
-    yield _of("bearing.alignment", bearing_records.Alignment)
+    yield _of("bearing.lubrication", rating_records.Lubrication)
+    yield _of("bearing.alignment", rating_records.Alignment)
     for element in ELEMENTS.values():
         if element.derived is not element.given:
             yield _of("bearing.contact", element.derived, bearing_records.Material, fill=RINGS)

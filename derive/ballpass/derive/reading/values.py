@@ -19,8 +19,10 @@ from ballpass.derive.reading.clearance_groups import clearance_of_group
 from ballpass.derive.scene.bearing_records import Bearing, CageMotion
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.mechanism_records import Driver, Mechanism
 from ballpass.derive.scene.quantity import Bounds, SceneNumber
-from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, Shaft, TableLoad
+from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.shaft_records import Load, Shaft, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 from ballpass.runtime.contract.defaults import longer_words
 from ballpass.runtime.contract.units import split_setting

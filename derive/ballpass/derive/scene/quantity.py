@@ -71,6 +71,8 @@ class Limits:
 
 
 NO_LIMITS = Limits()
+#: Limits of a length in polar form.
+AMOUNT = Limits(bounds=NOT_NEGATIVE, remedy="give the amount, and turn the angle by 180 deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +108,3 @@ class Vector:
     kind: Literal["zero", "axis", "cartesian", "polar"]
     first: SceneNumber | None = None
     second: SceneNumber | None = None
-
-    def quantities(self) -> tuple[SceneNumber, ...]:
-        """The numbers it is made of."""
-        return tuple(q for q in (self.first, self.second) if q is not None)

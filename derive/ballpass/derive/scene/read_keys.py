@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from ballpass.derive.scene.keys import ColumnKey, Fill, Key, QuantityKey, filled
+from ballpass.derive.scene.keys import ColumnKey, Fill, Key, QuantityKey, VectorKey, filled
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE
 from ballpass.derive.scene.table import Table
 
@@ -70,6 +70,13 @@ class Either:
 def number(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> QuantityKey:
     """The key of a number; `more` as in `QuantityKey`."""
     return QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more)
+
+
+def force_key(words: str, symbol: str, index: str = "", **more: Any) -> VectorKey:
+    """The key of a force: a single number is not enough, because its axis would be unknown."""
+    x, y = (f"{symbol}_{{{index}{',' * bool(index)}{axis}}}" for axis in "xy")
+    length, angle = f"{symbol}_{{{index}}}" if index else symbol, rf"\alpha_{{{index or symbol}}}"
+    return VectorKey(unit="N", words=words, symbols=("", x, y, length, angle), polar=("magnitude", "direction"), **more)
 
 
 def quantity(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:

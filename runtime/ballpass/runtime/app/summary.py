@@ -34,7 +34,6 @@ from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.point.model_limits import limits_of_model
 from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
 from ballpass.runtime.quantity.grammar import quantities_of
-from ballpass.runtime.quantity.kinds.drive_work import whole_cycles
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap
 from ballpass.runtime.ratings.result_limits import limit_words, passed_limit
@@ -288,7 +287,7 @@ def _drive_work(model: Model, sol: Solution) -> float | None:
     if mechanism is None or mechanism.angle or mechanism.swing:
         return None
     run = run_of(model, numbers, sol)
-    window = whole_cycles(run.span, Repetition.of(sol.manifest, numbers.values).turns)
+    window = run.span.whole_cycles(Repetition.of(sol.manifest, numbers.values).turns)
     if window is None:
         return None
     if has_quantities(sol, "drive_torque", model):

@@ -18,7 +18,7 @@ from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
 from ballpass.runtime.point.jacobian import rows_of
-from ballpass.runtime.quantity.kinds.life import PLACES
+from ballpass.runtime.quantity.cuts import PLACES
 from ballpass.runtime.ratings.of_bearing import rated_element, ratings_of
 
 #: What a page calls; memory for what it reads is the module's.

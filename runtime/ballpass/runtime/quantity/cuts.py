@@ -43,6 +43,9 @@ HALVINGS = 45
 #: one side.
 BEFORE = 1e-8
 
+#: Angle of ball 1 as the rings see it, outer and inner, behind the bearing's prefix.
+PLACES = ("cage.in_outer", "cage.in_inner")
+
 #: Sines of angles that are zero but for rounding, and Newton's steps to where an angle passes.
 ROUNDING, NEWTON = 1e-12, 3
 
@@ -149,7 +152,7 @@ def jumps_at(channel: str) -> float | None:
     """Angle at which a channel jumps by a turn, where a body makes whole turns [rad]; None of all but angles."""
     if channel == "drive_angle":
         return 0.0
-    in_half_turns = channel.endswith(("cage.in_outer", "cage.in_inner"))
+    in_half_turns = channel.endswith(PLACES)
     return np.pi if in_half_turns or (channel.startswith("body.") and channel.endswith(".angle")) else None
 
 

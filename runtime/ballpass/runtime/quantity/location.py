@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.manifest import BearingInfo, Manifest, TurningInfo
+from ballpass.runtime.contract.manifest import Manifest, TurningInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
@@ -103,7 +103,7 @@ def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Q
     if not quantity.place.endswith("Hz"):
         _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
     if quantity.place in _FREQUENCIES and quantity.place != "shaft":
-        bearing = _bearing_of(manifest, quantity)
+        bearing = quantity.bearing(manifest)
         moving = {**values, **timeline.highest_rates(manifest, values)}
         if not timeline.turns_steadily(bearing, moving, timeline.shaft_speed(manifest, moving)):
             words = bearing_words("no ball passes", [bearing])
@@ -111,12 +111,6 @@ def check_frequency(manifest: Manifest, values: Mapping[str, float], quantity: Q
                 f"{quantity.name}: the rings of {bearing.path} do not turn against each other, so that {words} "
                 "at a frequency of its own. Allowed: @shaft, an order as in @2x, a frequency as in @250Hz."
             )
-
-
-def _bearing_of(manifest: Manifest, quantity: Quantity) -> BearingInfo:
-    """The bearing of the channel, else the first."""
-    ours = (one for one in manifest.bearings if one.prefix and quantity.channel.startswith(one.prefix))
-    return next(ours, manifest.bearings[0])
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
@@ -174,7 +168,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     if form is not None or place == "shaft":
         order = 1.0 if form is None else float(form["number"])
         return order * abs(speed) / TURN, order * math.copysign(1.0, speed) * faster / TURN
-    bearing = _bearing_of(manifest, quantity)
+    bearing = quantity.bearing(manifest)
     at, what = bearing.path, _FREQUENCIES[place]
     frequency = float(getattr(frequencies_of(bearing, values), what))
     if what == "ball_pass_inner":

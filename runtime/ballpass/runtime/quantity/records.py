@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, MOMENTS, ReductionRows, reduction_rows
@@ -47,6 +48,11 @@ class Quantity:
     ball: int | None
     place: str
     unit: str
+
+    def bearing(self, manifest: Manifest) -> BearingInfo:
+        """The bearing of the channel, else the first."""
+        ours = (one for one in manifest.bearings if one.prefix and self.channel.startswith(one.prefix))
+        return next(ours, manifest.bearings[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -223,6 +229,26 @@ class View:
     def length(self) -> tuple[float, Array]:
         """Length of the time that counts [s], and its derivative, shape (directions,) [s/unit]."""
         return float(np.sum(self.nodes.weight)), np.sum(self.nodes.weight_slope, axis=0)
+
+    def rated_slopes(self, bearing: BearingInfo, rated: Callable[[Mapping[str, Any]], Any]) -> Array:
+        """Derivatives of what a bearing is rated by along the directions, shape (entries, directions).
+
+        Parameters
+        ----------
+        rated : CasADi's expression of parameters by name
+        """
+        values = self.numbers.values
+        names = [name for name in self.numbers.parameters if name.startswith(f"{bearing.path}.")]
+        every = casadi.SX.sym("parameters", len(names))
+        each = casadi.SX(rated(dict(zip(names, casadi.vertsplit(every), strict=True))))
+        slopes = casadi.Function("slopes", [every], [casadi.jacobian(each, every)])([values[name] for name in names])
+        seeds = np.array([self.slopes(name) for name in names]).reshape(len(names), self.directions)
+        return np.asarray(np.asarray(slopes) @ seeds)
+
+    def zero(self, note: str, moved: Array) -> Estimate:
+        """A norm that is zero; `moved` are derivatives of the quantity inside."""
+        kink = "it is zero and has a corner there; the derivative given is zero" if np.any(moved) else ""
+        return Estimate(value=0.0, slope=np.zeros(self.directions), notes=(note,), kink=kink)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,6 +17,9 @@ from ballpass.runtime.time.turning import Turning
 #: the angle of an edge within the last of them is exact to a thousandth of a turn.
 MOST_TURNS, MOST_TIME = 1e9, 1e9
 
+#: Part of a turn by which times miss it by rounding.
+NEAR = 1e-9
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Span:
@@ -90,6 +93,24 @@ class Span:
     def counting(self, turns: float) -> Span:
         """The same with so many turns that count, at the speed behind the last row."""
         return replace(self, end=self.start + turns * self.turning.turn, asked=None)
+
+    def whole_cycles(self, cycle: int) -> tuple[float, float] | None:
+        """Begin and end of the last whole turns that count [s]: as many as loads repeat after, or several times that.
+
+        They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what
+        counts; where its speed changes they are all that counts.  None where it holds none.
+        """
+        if not self.turning.is_even:
+            count = cycle * round(self.counted / cycle)
+            return (self.start, self.end) if count and abs(self.counted - count) < NEAR * count else None
+        turn = self.turning.turn
+        first, last = self.start / turn, self.end / turn
+        for end in (last, math.floor(last + NEAR)):
+            count = cycle * math.floor((end - first) / cycle + NEAR)
+            begin = end - count
+            if count > 0 and min(abs(begin - first), abs(begin - round(begin))) < NEAR * max(last, 1.0):
+                return begin * turn, end * turn
+        return None
 
     def check(self) -> Span:
         """The span itself.

@@ -37,7 +37,7 @@ from ballpass.derive.mechanism.kinematics import (
     subtract,
 )
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import Joint, Mechanism
+from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Words
 

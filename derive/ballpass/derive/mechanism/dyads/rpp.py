@@ -37,7 +37,7 @@ from ballpass.derive.mechanism.kinematics import (
     subscript,
     subtract,
 )
-from ballpass.derive.scene.records import Mechanism
+from ballpass.derive.scene.mechanism_records import Mechanism
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

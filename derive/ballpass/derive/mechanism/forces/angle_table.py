@@ -10,9 +10,9 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill, WholeKey
+from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import column, read_record
-from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 
 #: A cycle of more turns is no machine's.

@@ -13,7 +13,7 @@ from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.scene.records import Force, Mechanism
+from ballpass.derive.scene.mechanism_records import Force, Mechanism
 from ballpass.derive.terms import refuse_kinks
 from ballpass.derive.variables import Output, Terms
 

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.scene.body_keys import BODY
+from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import quantity
-from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import symbol_of
 
 

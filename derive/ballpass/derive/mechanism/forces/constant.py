@@ -8,7 +8,7 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
-from ballpass.derive.scene.records import Force
+from ballpass.derive.scene.mechanism_records import Force
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,9 +24,9 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.body_keys import Points, check_names
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.mechanism_records import Driver, Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, read_record
-from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output, StateSwitch

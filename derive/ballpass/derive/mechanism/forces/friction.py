@@ -11,9 +11,9 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill, Needs
+from ballpass.derive.scene.mechanism_records import Driver, Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, keys_of, not_negative, positive, read_record
-from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
@@ -30,17 +30,10 @@ class Friction(Law):
     one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("viscous",), ("AMOUNT",)), several=True),)
 
     viscous: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT*s/SIZE_UNIT",
-        "Viscous friction of NAME",
-        "c_{INDEX}",
-        "0.1 AMOUNT_UNIT*s/SIZE_UNIT",
+        "AMOUNT_UNIT*s/SIZE_UNIT", "Viscous friction of NAME", "c_{INDEX}", "0.1 AMOUNT_UNIT*s/SIZE_UNIT"
     )
     coulomb: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT",
-        "Coulomb friction of NAME",
-        "F_{c,INDEX}",
-        "2 AMOUNT_UNIT",
-        name="AMOUNT",
+        "AMOUNT_UNIT", "Coulomb friction of NAME", "F_{c,INDEX}", "2 AMOUNT_UNIT", name="AMOUNT"
     )
     smoothing: SceneNumber | None = positive(
         "SIZE_UNIT/s",

@@ -11,7 +11,8 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.keys import TextKey
-from ballpass.derive.scene.records import FRAME, Force, Joint
+from ballpass.derive.scene.mechanism_records import Force, Joint
+from ballpass.derive.scene.table import FRAME
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

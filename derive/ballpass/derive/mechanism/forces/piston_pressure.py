@@ -11,9 +11,9 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Law, Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.kinematics import Pair
+from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.read_keys import not_negative, positive, quantity
-from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import upright
 from ballpass.derive.terms import defined, symbol_of
 

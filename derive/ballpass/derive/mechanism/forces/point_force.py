@@ -12,9 +12,9 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import Pair, body_point, scale
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
-from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.read_keys import quantity
-from ballpass.derive.scene.records import AMOUNT, Force, force_key
+from ballpass.derive.scene.mechanism_records import Force
+from ballpass.derive.scene.quantity import AMOUNT, SceneNumber, Vector
+from ballpass.derive.scene.read_keys import force_key, quantity
 from ballpass.derive.terms import components, symbol_of
 
 

@@ -10,9 +10,9 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Needs
+from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, not_negative, quantity
-from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
@@ -30,18 +30,10 @@ class SpringDamper(Law):
     one_of: ClassVar[tuple[Either, ...]] = (Either(groups=(("stiffness",), ("damping",)), several=True),)
 
     stiffness: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT/SIZE_UNIT",
-        "Stiffness of NAME",
-        "k_{INDEX}",
-        "1e4 AMOUNT_UNIT/SIZE_UNIT",
+        "AMOUNT_UNIT/SIZE_UNIT", "Stiffness of NAME", "k_{INDEX}", "1e4 AMOUNT_UNIT/SIZE_UNIT"
     )
     free: SceneNumber | None = quantity(
-        "SIZE_UNIT",
-        "THE_SIZE of NAME without force",
-        "L_{0,INDEX}",
-        "EXAMPLE",
-        name="free_SIZE",
-        needs=_STIFF,
+        "SIZE_UNIT", "THE_SIZE of NAME without force", "L_{0,INDEX}", "EXAMPLE", name="free_SIZE", needs=_STIFF
     )
     cubic_stiffness: SceneNumber | None = quantity(
         "AMOUNT_UNIT/SIZE_UNIT^3",
@@ -53,10 +45,7 @@ class SpringDamper(Law):
         note="times the third power of what is beyond the free size; a negative one softens",
     )
     damping: SceneNumber | None = not_negative(
-        "AMOUNT_UNIT*s/SIZE_UNIT",
-        "Damping of NAME",
-        "c_{INDEX}",
-        "10 AMOUNT_UNIT*s/SIZE_UNIT",
+        "AMOUNT_UNIT*s/SIZE_UNIT", "Damping of NAME", "c_{INDEX}", "10 AMOUNT_UNIT*s/SIZE_UNIT"
     )
     preload: SceneNumber | None = quantity(
         "AMOUNT_UNIT", "THE_AMOUNT of NAME at its free SIZE", "F_{0,INDEX}", "5 AMOUNT_UNIT", optional=True

@@ -13,7 +13,8 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import Pair, cross, dot, rotate, subscript
 from ballpass.derive.mechanism.swing import Average, followed, nearest
 from ballpass.derive.scene.body_keys import BODIES
-from ballpass.derive.scene.records import FRAME, Force
+from ballpass.derive.scene.mechanism_records import Force
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import defined, symbol_of
 from ballpass.runtime.contract.manifest import UsualInfo
 

@@ -12,7 +12,8 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Set
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import FRAME, Force, Mechanism
+from ballpass.derive.scene.mechanism_records import Force, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.variables import Output
 
 

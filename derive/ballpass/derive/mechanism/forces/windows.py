@@ -13,9 +13,9 @@ from ballpass.derive.drive import OverAngle
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.mechanism_records import Driver, Force
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import positive, quantity, read_record
-from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table, upright
 from ballpass.derive.terms import defined
 from ballpass.runtime.contract.manifest import UsualInfo

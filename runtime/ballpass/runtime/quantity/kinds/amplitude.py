@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ballpass.runtime.quantity.kinds.means import zero
 from ballpass.runtime.quantity.location import FREQUENCY, check_frequency, frequency
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 
@@ -26,7 +25,7 @@ def _amplitude(view: View, quantity: Quantity) -> Estimate:
     size = abs(line)
     if size <= ROUNDING * float(np.max(np.abs(value))):
         # which way the line grows from there is rounding too
-        return zero(view, "zero", line_slope)
+        return view.zero("zero", line_slope)
     return Estimate(value=size, slope=np.real(np.conj(line) * line_slope) / size)
 
 

@@ -39,7 +39,7 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     rest = static_equilibrium(model, numbers, t=time)
     names = [] if chain is None else [*chain.names, "time"]
     if quantity.kind == "static_deflection":
-        info = next(one for one in model.manifest.bearings if one.prefix == quantity.channel)
+        info = quantity.bearing(model.manifest)
         states = [info.inner_states(axis, numbers.values) for axis in "xy"]
         place = np.array([sum(weight * rest[name] for name, weight in one.items()) for one in states])
         value, ball = float(np.hypot(*place)), None

@@ -13,41 +13,19 @@ from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.quantity.location import moved_numbers
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, View
 from ballpass.runtime.time.repetition import Repetition
-from ballpass.runtime.time.span import Span
+from ballpass.runtime.time.span import NEAR
 from ballpass.runtime.time.timeline import along, driver_info, is_free
 from ballpass.runtime.time.turning import STEP, TURN, Turning
 
-#: Part of a turn by which times miss it by rounding.
-_NEAR = 1e-9
-
 #: Part of a turn, and of a work, by which a run that is a little shorter shows whether its work is another one.
 _LESS = 1e-6
-
-
-def whole_cycles(span: Span, cycle: int) -> tuple[float, float] | None:
-    """Begin and end of the last whole turns that count [s]: as many as loads repeat after, or several times that.
-
-    They begin and end where the driver has made whole turns since t = 0, as segments of a run do, or with what counts;
-    where its speed changes they are all that counts.  None where it holds none.
-    """
-    if not span.turning.is_even:
-        count = cycle * round(span.counted / cycle)
-        return (span.start, span.end) if count and abs(span.counted - count) < _NEAR * count else None
-    turn = span.turning.turn
-    first, last = span.start / turn, span.end / turn
-    for end in (last, math.floor(last + _NEAR)):
-        count = cycle * math.floor((end - first) / cycle + _NEAR)
-        begin = end - count
-        if count > 0 and min(abs(begin - first), abs(begin - round(begin))) < _NEAR * max(last, 1.0):
-            return begin * turn, end * turn
-    return None
 
 
 def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
     span, cycle = view.run.span, Repetition.of(view.manifest, view.numbers.values).turns
-    window = whole_cycles(span, cycle)
+    window = span.whole_cycles(cycle)
     if window is None:
         raise RequestError(
             f"{quantity.name}: the time that counts holds no whole turn of the driver, or fewer than all loads repeat "
@@ -57,12 +35,12 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
     if not span.turning.is_even:
         return _of_changing_speed(view, quantity)
     (value, slope), kink = _mean_within(view, quantity, window), ""
-    if span.asked is None and span.end - window[1] < _NEAR * span.turning.turn:
+    if span.asked is None and span.end - window[1] < NEAR * span.turning.turn:
         # the turns end elsewhere at another speed, though the run does not
         turning = -window[1] / view.numbers.values[mechanism.speed] * view.slopes(mechanism.speed)
         last = view.channel(quantity)[0][np.argmax(view.nodes.t)]
         slope = slope + (last - value) / (window[1] - window[0]) * turning
-        fewer = whole_cycles(replace(span, end=span.end - _LESS * span.turning.turn), cycle)
+        fewer = replace(span, end=span.end - _LESS * span.turning.turn).whole_cycles(cycle)
         other = None if fewer is None else _mean_within(view, quantity, fewer)[0]
         if other is None or abs(other - value) > _LESS * abs(value):
             kink = (
@@ -77,7 +55,7 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
 
 def _mean_within(view: View, quantity: Quantity, window: tuple[float, float]) -> tuple[float, Array]:
     """Mean of the channel over a window from edge to edge, and its derivative."""
-    nodes, near = view.nodes, _NEAR * view.run.span.turning.turn
+    nodes, near = view.nodes, NEAR * view.run.span.turning.turn
     within = (window[0] - near < nodes.t) & (nodes.t < window[1] + near)
     whole = replace(
         nodes,

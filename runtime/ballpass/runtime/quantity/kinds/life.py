@@ -5,7 +5,7 @@ In: the data of a run for a kind of quantity.  Out: an `Estimate` in turns of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import SECTORS, TURNED
+from ballpass.runtime.quantity.cuts import PLACES
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import KILO, ElementLife, raceway_life
@@ -27,9 +28,6 @@ Array = NDArray[np.float64]
 
 #: A number or an array, and its derivative, with an axis of directions behind.
 Dual = tuple[float | Array, Array]
-
-#: Angle of ball 1 as the rings see it, outer and inner, behind the bearing's prefix.
-PLACES = ("cage.in_outer", "cage.in_inner")
 
 #: Rate at Gauss's nodes of what has values there, over the part of a panel: that of the polynomial through them.
 _POWERS = np.vander(GAUSS, increasing=True)
@@ -49,7 +47,7 @@ def life(view: View, quantity: Quantity) -> Estimate:
         The bearing does not turn.
     """
     _check(view.manifest, view.numbers.values, quantity)
-    bearing, prefix = bearing_of(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
+    bearing, prefix = quantity.bearing(view.manifest), quantity.channel.removesuffix("ball.force")
     ratings = ratings_of(bearing, view.numbers.values)
     powers = _powers(_over_passes(view, prefix), quantity, prefix, ratings.life)
     value, slope = float(raceway_life(_rings(ratings), powers[0], ratings.life)), np.zeros(view.directions)
@@ -63,14 +61,9 @@ def _rings(ratings: Ratings) -> tuple[Any, Any]:
     return ratings.inner_ball, ratings.outer_ball
 
 
-def bearing_of(manifest: Manifest, quantity: Quantity) -> BearingInfo:
-    """The bearing that a quantity is of."""
-    return next(one for one in manifest.bearings if one.prefix + "ball.force" == quantity.channel)
-
-
 def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
     moving = {**values, **set_moving(manifest, values)}
-    refuse_swinging(bearing_of(manifest, quantity), moving, shaft_speed(manifest, moving))
+    refuse_swinging(quantity.bearing(manifest), moving, shaft_speed(manifest, moving))
 
 
 def _moved(dual: Dual) -> NDArray[np.complex128]:
@@ -81,25 +74,9 @@ def _moved(dual: Dual) -> NDArray[np.complex128]:
 
 def _moved_rings(view: View, bearing: BearingInfo, ratings: Ratings) -> tuple[Any, Any]:
     """Q_ci and Q_ce moved along the directions [N]."""
-    slopes = slopes_of(view, bearing, lambda values: casadi.vertcat(*_rings(ratings_of(bearing, values))))
+    slopes = view.rated_slopes(bearing, lambda values: casadi.vertcat(*_rings(ratings_of(bearing, values))))
     inner, outer = map(_moved, zip(_rings(ratings), slopes, strict=True))
     return inner, outer
-
-
-def slopes_of(view: View, bearing: BearingInfo, rated: Callable[[Mapping[str, Any]], Any]) -> Array:
-    """Derivatives of what a bearing is rated by along the directions, shape (entries, directions).
-
-    Parameters
-    ----------
-    rated : CasADi's expression of parameters by name
-    """
-    values = view.numbers.values
-    names = [name for name in view.numbers.parameters if name.startswith(f"{bearing.path}.")]
-    every = casadi.SX.sym("parameters", len(names))
-    each = casadi.SX(rated(dict(zip(names, casadi.vertsplit(every), strict=True))))
-    slopes = casadi.Function("slopes", [every], [casadi.jacobian(each, every)])([values[name] for name in names])
-    seeds = np.array([view.slopes(name) for name in names]).reshape(len(names), view.directions)
-    return np.asarray(np.asarray(slopes) @ seeds)
 
 
 def _over_passes(view: View, prefix: str) -> View:
@@ -153,7 +130,7 @@ def _raceway(view: View, load: Array, moved: Array, power: float, channel: str) 
 
 
 def _reduced(runs: ReducedRuns, quantity: Quantity) -> Array:
-    bearing = bearing_of(runs.manifest, quantity)
+    bearing = quantity.bearing(runs.manifest)
     # powers of numbers and of arrays differ in the last bit
     ratings = ratings_of(bearing, {name: np.atleast_1d(value) for name, value in runs.values.items()})
     powers = raceway_powers(runs.manifest, bearing, runs.rows)

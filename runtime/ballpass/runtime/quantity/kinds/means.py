@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ballpass.runtime.native.reduction_rows import moments_of, rms_of
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
 
@@ -28,14 +26,8 @@ def _rms(view: View, quantity: Quantity) -> Estimate:
     square, moved = view.mean(value**2, 2.0 * value[:, None] * slope)
     root = math.sqrt(square)
     if root == 0.0:
-        return zero(view, "zero throughout", slope)
+        return view.zero("zero throughout", slope)
     return Estimate(value=root, slope=moved / (2.0 * root))
-
-
-def zero(view: View, note: str, moved: Array) -> Estimate:
-    """A norm that is zero; `moved` are derivatives of the quantity inside."""
-    kink = "it is zero and has a corner there; the derivative given is zero" if np.any(moved) else ""
-    return Estimate(value=0.0, slope=np.zeros(view.directions), notes=(note,), kink=kink)
 
 
 def _reduced_mean(runs: ReducedRuns, quantity: Quantity) -> Array:

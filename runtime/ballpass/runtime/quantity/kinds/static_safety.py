@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
-from ballpass.runtime.quantity.kinds.extremes import extreme
-from ballpass.runtime.quantity.kinds.life import bearing_of, slopes_of
+from ballpass.runtime.quantity.extreme_value import extreme
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import static_safety
 from ballpass.runtime.ratings.of_bearing import geometry_of, ratings_of
@@ -26,22 +25,22 @@ def _of_one_newton(bearing: BearingInfo, values: Mapping[str, Any]) -> Any:
 
 
 def _safety(view: View, quantity: Quantity) -> Estimate:
-    bearing, peak = bearing_of(view.manifest, quantity), extreme(view, quantity, "max")
+    bearing, peak = quantity.bearing(view.manifest), extreme(view, quantity, "max")
     if peak.value <= 0.0:
         return replace(peak, value=np.inf, slope=np.zeros(view.directions))
     value = float(_of_one_newton(bearing, view.numbers.values)) / peak.value
-    (rated,) = slopes_of(view, bearing, lambda values: _of_one_newton(bearing, values))
+    (rated,) = view.rated_slopes(bearing, lambda values: _of_one_newton(bearing, values))
     return replace(peak, value=value, slope=(rated - value * peak.slope) / peak.value)
 
 
 def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
-    ratings_of(bearing_of(manifest, quantity), values)  # refuses elements that no standard rates
+    ratings_of(quantity.bearing(manifest), values)  # refuses elements that no standard rates
 
 
 def _reduced(runs: ReducedRuns, quantity: Quantity) -> Array:
     with np.errstate(divide="ignore"):
         peak = np.maximum(runs.entry("max", quantity.channel), 0.0)
-        return np.asarray(_of_one_newton(bearing_of(runs.manifest, quantity), runs.values) / peak)
+        return np.asarray(_of_one_newton(quantity.bearing(runs.manifest), runs.values) / peak)
 
 
 KINDS = (
