@@ -55,8 +55,12 @@ class _Printer:
 
 
 @typed
-def equations(system: System) -> str:
+def equations(system: System, *, values: bool = True) -> str:
     """Markdown with every derived equation of the scene: parameters, linkage, Eq. (1), contact, equations of motion.
+
+    Parameters
+    ----------
+    values : whether the table of parameters has those of the scene
 
     Examples
     --------
@@ -64,15 +68,19 @@ def equations(system: System) -> str:
     >>> page.splitlines()[2]
     '# Derived equations: rotor'
     """
-    tex, parameters = _Printer(system), system.parameters
+    tex = _Printer(system)
+    numbers: list[tuple[str, ...]]
+    numbers = [(f"${p.latex}$", f"`{p.name}`", _unit(p.unit), p.description) for p in system.parameters]
+    if values:
+        numbers = [(*row[:2], f"{p.default:.7g}", *row[2:]) for row, p in zip(numbers, system.parameters, strict=True)]
     parts = [
         HEADER,
         f"# Derived equations: {system.scene.name}",
         "Frame: x right, y up, angles counter-clockwise from +x. SI units. Equation numbers are those of the paper.",
         *_table_of(
             "Parameters",
-            ("symbol", "name", "value", "unit", "meaning"),
-            ((f"${p.latex}$", f"`{p.name}`", f"{p.default:.7g}", _unit(p.unit), p.description) for p in parameters),
+            ("symbol", "name", *(["value"] if values else []), "unit", "meaning"),
+            numbers,
         ),
     ]
     if system.states:

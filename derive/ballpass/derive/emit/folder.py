@@ -49,7 +49,7 @@ def write_folder(folder: Path, system: System, functions: LoweredFunctions, sour
     # values only: without a compiler the runtime makes their derivatives when they are needed
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
     _pack(folder / "jacobians.casadi", values)
-    (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
+    (folder / "EQUATIONS.md").write_text(equations(system, values=False), encoding="utf-8", newline="\n")
     files = tuple((p.name, file_digest(p)) for p in sorted(folder.iterdir()))
     write_manifest(folder, describe(system, functions, source, files), made_by=deriving_sources())
 
