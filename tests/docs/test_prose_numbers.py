@@ -61,6 +61,9 @@ NAMED: dict[str, dict[str, str]] = {
         "limits another quantity": "a statement",
         "a sweep of 33 values comes first": "`SWEPT` of questions/optimize.py",
     },
+    "docs/howto/paper_figures.md": {
+        "letters of 7 points": "`PAPER_SCALE` of plot/style.py",
+    },
     "docs/howto/fit.md": {
         "its 95 % interval": "`CONFIDENCE` of fit/least_squares.py",
     },

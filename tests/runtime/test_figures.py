@@ -7,6 +7,7 @@ import re
 import struct
 import subprocess
 import sys
+import warnings
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -46,6 +47,7 @@ from ballpass.runtime.plot.style import (
     save,
     write_figures,
 )
+from ballpass.runtime.questions.question import declared
 
 Run = tuple[Model, Solution]
 
@@ -147,6 +149,40 @@ def test_figures_for_a_paper_have_its_width_and_letters_of_seven_points(press: R
         (box,) = (text.get_window_extent() for text in axes.texts)
         places = np.vstack([axes.transData.transform(line.get_xydata()) for line in axes.lines])
         assert np.max(places[places[:, 0] > box.x0, 1]) < box.y0
+
+
+@pytest.mark.parametrize("name", ["spectrum", "spectrogram", "map"])
+def test_axes_in_a_narrow_column_keep_their_room_and_limits(
+    make_model: Callable[..., Model], tmp_path: Path, name: str
+) -> None:
+    """Legends stand below, and ticks beyond the limits do not stretch what a map is drawn over."""
+    rotor, plane = (
+        make_model("varying_compliance"),
+        ["bearing.clearance=2 um:10 um:3", "shaft.speed=1000 rpm:7000 rpm:4"],
+    )
+    answer: object
+    if name == "map":
+        question, answer = Model.bifurcation, rotor.bifurcation(plane, readings=20, settling=5)
+    else:
+        question, answer = Model.spectrum, rotor.spectrum("inner.y", cycles=30, spectrogram=name == "spectrogram")
+    figures = declared(question).figures
+    assert figures is not None
+    with on_paper(0.085, titles=False), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (_, figure), *_ = figures(rotor, answer, {})
+        save(figure, tmp_path / "figure.png")
+    width, height = figure.bbox.size
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    for axes in panels:
+        assert axes.bbox.width > (0.4 if name == "spectrogram" else 0.5) * width
+        assert axes.bbox.height > 0.3 * height
+        if name == "map":
+            assert axes.get_xlim() == pytest.approx((0.0, 12.0))
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= width
+        assert not any(box.overlaps(axes.get_tightbbox()) for axes in panels)
 
 
 def test_captions_stand_beside_the_pictures(press: Run, tmp_path: Path) -> None:

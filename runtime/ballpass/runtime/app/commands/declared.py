@@ -254,8 +254,8 @@ def _ask(
         plain = to_plain(report) | ({} if apart is None else {"uncertainty": apart}) | {"request": asked}
         written: list[Path] = []
         if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
             if not question.always:
-                folder.mkdir(parents=True, exist_ok=True)
                 written = [folder / f"{question.name}.json"]
                 replace_file(written[0], json_text(plain).encode())
             for name, content in (question.files(answer) if question.files else {}).items():
