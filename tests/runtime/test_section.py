@@ -61,6 +61,12 @@ def test_a_motion_has_the_name_that_bifurcation_gives_it(rotor: Model, speed: fl
     assert (found.motion, found.every) == (diagram.up[0].kind, diagram.every)
     assert found.motion == name
     assert f"Motion: {name}, read each time" in " ".join(str(found).split())
+    # points once a period are the readings of the diagram
+    points = rotor.section(once="period", settling=1000, readings=40, parameters={"shaft.speed": speed * math.tau / 60})
+    count = int(name.split()[1])
+    assert (points.kind, points.period) == (f"repeats after {count} point{'s' if count > 1 else ''}", count)
+    for state in diagram.up[0].states[-count:]:
+        assert np.min(np.max(np.abs(points.states - state) / [1e-6, 1e-6, 1e-3, 1e-3], axis=1)) < 1e-2
 
 
 @pytest.mark.long
@@ -82,6 +88,28 @@ def test_a_chaotic_motion_has_one_name(make_model: Callable[..., Model]) -> None
     found = model.section(parameters=given)
     diagram = model.bifurcation("bearing.clearance=29.99 um:30 um:2", parameters=given, readings=40, settling=10)
     assert found.motion == diagram.up[-1].kind == "chaotic"
+    assert found.exponent is not None
+    assert found.exponent.mean == pytest.approx(diagram.up[-1].exponent.mean, abs=0.3)
+    assert f"largest exponent per reading {found.exponent.words}" in " ".join(str(found).split())
+    points = model.section(parameters=given, once="period")  # a period is a turn here
+    assert np.array_equal(points.states, found.states)
+    assert points.kind == "chaotic"
+
+
+@pytest.mark.long
+def test_readings_of_a_section_decide_what_sixty_leave_open(make_model: Callable[..., Model]) -> None:
+    """A rotor under its weight with 40 um of clearance: a disturbance grows by 0.18 a reading, and scatters."""
+    model = make_model("varying_compliance")
+    given = {"shaft.speed": 3750 * math.tau / 60, "bearing.clearance": 40e-6}
+    few = model.section(parameters=given, once="period", readings=60, settling=300)
+    found = model.section(parameters=given, once="period", readings=1000, settling=300)
+    assert few.kind == "undecided"
+    assert found.kind == "chaotic"
+    assert found.exponent is not None
+    assert found.exponent.half < 0.04
+    # drive and cage have no common period
+    with pytest.raises(RequestError, match="once = turn"):
+        make_model("rotor").section(once="period", parameters={"bearing.pitch_diameter": 31.4159265e-3})
 
 
 @pytest.mark.long
