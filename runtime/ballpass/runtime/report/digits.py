@@ -108,6 +108,8 @@ def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) ->
     --------
     >>> shared_text(["4390.5 N (ball 3)", "4390.9 N (ball 5)"]), shared_text(["0.0457", "0.0618"])
     ('4390.5 ±0.8 N (ball 3 or 5)', '0.05 ±0.04')
+    >>> shared_text([f"320 N (ball {k} at 0.{k} s)" for k in (1, 5, 8)])
+    '320 N (elsewhere at each tolerance)'
     """
     words = _NUMBER.split(texts[0])
     if len(set(texts)) == 1 or any(_NUMBER.split(text) != words for text in texts):
