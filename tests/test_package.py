@@ -165,12 +165,12 @@ def test_wheels_run_from_elsewhere_first_the_runtime_alone_then_the_whole(
 
     # the package of the page about a law of one's own, from its wheel
     page = (ROOT / "docs" / "howto" / "own_law.md").read_text(encoding="utf-8")
-    (law, test), (project, table) = (
+    (law, second, test), (project, table) = (
         re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL) for kind in ("python", "toml")
     )
     package = tmp_path / "cubic-damping"
     package.mkdir()
-    (package / "cubic_damping.py").write_text(law, encoding="utf-8")
+    (package / "cubic_damping.py").write_text(f"{law}\n{second}", encoding="utf-8")
     (package / "pyproject.toml").write_text(project, encoding="utf-8")
     subprocess.run((sys.executable, "-m", "build", "--wheel", "--outdir", archives, package), check=True)
     install(programs, archives, "cubic-damping")

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from functools import partial
@@ -19,7 +20,7 @@ import numpy as np
 import pytest
 import xarray
 
-from ballpass.derive import derive
+from ballpass.derive import derive, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 from ballpass.runtime.app.commands.mcp import command_line, tools
@@ -32,7 +33,7 @@ from test_agents import ASKED, call, numbers
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs/howto/own_law.md").read_text(encoding="utf-8")
-LAW, TEST = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+LAW, SECOND, TEST = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 PROJECT, TABLE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 NUMBERS = TABLE.split("\n", 2)[2]
 OWN = (ROOT / "tests/machines/own_parts.py").read_text(encoding="utf-8")
@@ -102,6 +103,9 @@ def test_a_law_runs_is_derived_anew_where_it_changes_and_runs_where_it_is_missin
     first = highest(command(*RUN))
     install(place / "site", LAW.replace("rate**3", "9 * rate**3"))
     try:
+        folder = command("run", "generated/press", *RUN[2:])
+        assert highest(folder) == first
+        assert "numbers are those of then" in " ".join(folder.stderr.split())
         assert abs(highest(command(*RUN)) / first - 1.0) > 1e-3
     finally:
         install(place / "site")
@@ -114,6 +118,27 @@ def test_a_law_runs_is_derived_anew_where_it_changes_and_runs_where_it_is_missin
     assert refused.returncode == 2
     assert "--plugin" in refused.stderr
     assert highest(command("--plugin", "site/cubic_damping.py", *RUN, site="")) == first
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (('numbers["cubic"]', 'numbers["cubik"]'), ["cubic_damping.py, line 2", "KeyError: 'cubik'"]),
+        (('unit = "s^3/m^3"', 'unit = "blorg"'), ["cubic_damping", 'no unit is called "blorg"']),
+        (('unit = "s^3/m^3"', 'unit = ""'), ["cubic_damping", 'has the unit "1"']),
+    ],
+)
+def test_a_slip_in_a_law_is_told_with_its_place(place: Path, change: tuple[str, str], said: list[str]) -> None:
+    """In words, as other faults, not as the path that Python took."""
+    try:
+        install(place / "site", LAW.replace(*change))
+        refused = run_command(place, *RUN)
+    finally:
+        install(place / "site")
+    assert refused.returncode == 2
+    assert "Traceback" not in refused.stderr
+    for words in said:
+        assert words in refused.stderr
 
 
 @pytest.fixture(scope="module")
@@ -219,10 +244,25 @@ def test_the_kit_passes_the_page_s_law(law_of: Callable[..., str]) -> None:
     check_damping_law("cubic", NUMBERS, plugins=[law_of("right_law")])
 
 
+def test_the_law_of_two_numbers_on_the_page_is_hunt_crossley_s_with_its_factor(written: Callable[..., str]) -> None:
+    """8 (1 - 0.8) / (5 · 0.8 · 0.1 m/s) = 4 s/m."""
+    numbers = 'restitution = 0.8\nimpact_speed = "0.1 m/s"'
+    check_damping_law("flores", numbers, plugins=[written(f"{LAW}\n{SECOND}", "two_laws")])
+    text = (ROOT / "scenes/varying_compliance.toml").read_text(encoding="utf-8")
+    peaks = []
+    for law in (f'law = "flores"\n{numbers}', 'law = "hunt-crossley"\nhysteresis = "4 s/m"'):
+        scene = scene_from_text(text.replace('law = "none"', law), "two")
+        with tempfile.TemporaryDirectory() as place:
+            model = load(generate(scene, Path(place) / "two"))
+            peaks.append(model.quantities("peak_ball_force", cycles=1, transient=0)["peak_ball_force"].value)
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new", "words"),
     [
         ("wrong_unit", "rate**3", "rate**2 * sp.Piecewise((1, rate > 0), (-1, True))", "has not the unit N"),
+        ("two_numbers", "rate**3", "rate**3 * sp.Symbol('speed')", "its force has speed beside"),
         ("no_event", "rate**3", "rate**3 * (1 + sp.tanh((rate - 0.01) / 1e-20)) / 2", "jumps at the rate 0.01"),
         pytest.param("gives_energy", "rate**3", "-(rate**3)", "gives energy", marks=pytest.mark.long),
         pytest.param(

@@ -63,6 +63,12 @@ def check_damping_law(law: str, numbers: str, *, plugins: Sequence[str] = ()) ->
     """
     use(plugins)
     own = LAWS[law]
+    formula = _formula(own)
+    if others := formula.free_symbols - {_DELTA, _RATE, _STIFFNESS, _COEFFICIENT}:
+        raise ConformanceError(
+            f'The damping law "{law}": its force has {", ".join(sorted(map(str, others)))} beside deflection, rate, '
+            "coefficient and contact. Allowed: one number of its own, the coefficient, made of all that the law has."
+        )
     text = shipped_scenes()["varying-compliance"].read_text(encoding="utf-8")
     scene = scene_from_text(text.replace('law = "none" ', f'law = "{law}"\n{numbers}  '), "conformance")
     with tempfile.TemporaryDirectory() as place:
@@ -71,7 +77,6 @@ def check_damping_law(law: str, numbers: str, *, plugins: Sequence[str] = ()) ->
     p, c = (np.array(a) for a in (model.numbers().p, model.numbers().c))
     constants = model.constants()
     k_b, c_b = constants["bearing.k_b"], constants.get("bearing.c_b", 0.0)
-    formula = _formula(own)
     exact = sp.lambdify((_DELTA, _RATE, _STIFFNESS, _COEFFICIENT), formula, "mpmath")
 
     def force(delta: float, rate: float) -> float:

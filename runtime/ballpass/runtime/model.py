@@ -21,7 +21,7 @@ from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.contract.plugins import use
+from ballpass.runtime.contract.plugins import use, warn_of_changes
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.ensemble_parts import simulate_parts
 from ballpass.runtime.many.members import Table
@@ -67,6 +67,8 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     -----
     NoCompilerWarning
         There is no compiler: the functions run in CasADi's virtual machine.
+    PluginWarning
+        A package of which the scene has a law is not installed, or has changed since.
 
     Raises
     ------
@@ -96,6 +98,7 @@ def _loaded(folder: str | Path, compiler: str | None, read: Callable[[], Manifes
     # absolute: functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
     manifest = read()
+    warn_of_changes(manifest.versions, place)
     try:
         with shown("compiling"):
             library = compile_model(place, manifest, compiler)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import tomllib
-import warnings
 from collections.abc import Iterable
 from dataclasses import fields
 from functools import cache
@@ -22,7 +21,7 @@ from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime.contract import manifest as mf
 from ballpass.runtime.contract.folder import intact_manifest
 from ballpass.runtime.contract.folders import read_file
-from ballpass.runtime.contract.plugins import PluginWarning, digest_of, modules_of, used_modules
+from ballpass.runtime.contract.plugins import PLUGIN, digest_of, modules_of, used_modules
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
@@ -32,10 +31,6 @@ if TYPE_CHECKING:
     from ballpass.derive.scene.records import Scene
 
 T = TypeVar("T", bound="DataclassInstance")
-
-
-#: Begin of the name of a plugin among the versions.
-_PLUGIN = "plugin "
 
 
 def signature(scene: Scene) -> str:
@@ -66,7 +61,7 @@ def source_key(path: Path, plugins: Iterable[tuple[str, str]] = ()) -> str:
 def versions(plugins: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     """Names and versions of the packages that decide what is generated; of plugins the digests."""
     packages = (("ballpass", __version__), *((name, version(name)) for name in ("casadi", "sympy")))
-    return (*packages, *((_PLUGIN + name, digest) for name, digest in plugins))
+    return (*packages, *((PLUGIN + name, digest) for name, digest in plugins))
 
 
 def plugins_of(scene: Scene) -> tuple[tuple[str, str], ...]:
@@ -88,21 +83,11 @@ def plugins_of(scene: Scene) -> tuple[tuple[str, str], ...]:
 def is_of_file(manifest: mf.Manifest, path: Path) -> bool:
     """Whether a manifest is that of a scene file as it is now, with the plugins as they are.
 
-    One that is not installed counts as unchanged, with a warning: what it decided is generated.
+    One that is not installed counts as unchanged: what it decided is generated.
     """
-    recorded = {name.removeprefix(_PLUGIN): key for name, key in manifest.versions if name.startswith(_PLUGIN)}
+    recorded = {name.removeprefix(PLUGIN): key for name, key in manifest.versions if name.startswith(PLUGIN)}
     present = {name: digest_of(name) for name in recorded}
-    same = manifest.source == source_key(path, ((name, present[name] or recorded[name]) for name in recorded))
-    missing = [name for name in recorded if present[name] is None]
-    if same and missing:
-        warnings.warn(
-            f"{path} takes a law, element or effect from {', '.join(missing)}, which Python does not find here: the "
-            "model runs as it was generated, and cannot be derived anew. Install it, or give its file: --plugin "
-            f"{missing[0]}.py.",
-            PluginWarning,
-            stacklevel=2,
-        )
-    return same
+    return manifest.source == source_key(path, ((name, present[name] or recorded[name]) for name in recorded))
 
 
 def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
@@ -118,7 +103,7 @@ def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> 
         return None
     try:
         present = intact_manifest(folder_of(scene, out), own=True, made_by=deriving_sources())
-        recorded = {name.removeprefix(_PLUGIN) for name, _ in present.versions}
+        recorded = {name.removeprefix(PLUGIN) for name, _ in present.versions}
         if not used_modules() <= recorded:  # one may have a law of the same name
             return None
         return present if is_of_file(present, Path(scene)) else None

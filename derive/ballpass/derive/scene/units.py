@@ -16,7 +16,7 @@ from ballpass.runtime.contract.units import COMMON, KINDS, GrammarError, Quantit
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["COMMON", "KINDS", "QuantityError", "looked_up_size", "parse_quantity", "show"]
+__all__ = ["COMMON", "KINDS", "QuantityError", "check_unit", "looked_up_size", "parse_quantity", "show"]
 
 
 def parse_quantity(given: object, unit: str) -> float:
@@ -54,6 +54,13 @@ def looked_up_size(name: str) -> UnitSize:
         rounded=1.0,
         base=tuple(sorted((str(base), Fraction(str(power))) for base, power in one.unit_items())),
     )
+
+
+def check_unit(text: str) -> None:
+    """Refuse what is no unit; a number without one has the unit "1"."""
+    if not text:
+        raise GrammarError('no unit is given; a number without one has the unit "1"', 'write "1"')
+    units.unit_size(text, looked_up_size)
 
 
 def _not_proportional(name: str) -> GrammarError:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
+import traceback
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -28,6 +30,9 @@ GROUPS = (
 #: Name of the tuple in a module.
 TUPLE = "BALLPASS"
 
+#: Before the name of a module among the versions of a manifest, where its digest stands.
+PLUGIN = "plugin "
+
 T = TypeVar("T")
 
 #: Modules that `use` was called with, in that order, and what named them: absolute paths of files.
@@ -38,7 +43,7 @@ _listed_by: dict[int, set[str]] = {}
 
 
 class PluginWarning(BallpassWarning):
-    """A plugin that a model was derived with is not installed."""
+    """A plugin that a model was derived with is not installed, or has changed."""
 
 
 class MissingEntryError(RequestError, KeyError):
@@ -118,6 +123,29 @@ def digest_of(module: str) -> str | None:
         for path in sorted(path for path in folder.glob(pattern) if path.is_file() and path.suffix != ".pyc"):
             digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def warn_of_changes(versions: Iterable[tuple[str, str]], folder: Path) -> None:
+    """Warn of plugins that a folder was generated with and that are not installed, or have other sources now."""
+    for name, key in versions:
+        module = name.removeprefix(PLUGIN)
+        if module == name or (now := digest_of(module)) == key:
+            continue
+        words = "has changed since, and numbers are those of then. Run the scene file, which derives it anew"
+        if now is None:
+            words = (
+                "Python does not find here: the model runs as it was generated, and cannot be derived anew. Install "
+                f"it, or give its file: --plugin {module}.py"
+            )
+        warnings.warn(f"{folder} has a law, element or effect of {module}, which {words}.", PluginWarning, stacklevel=4)
+
+
+def place_of(fault: BaseException) -> str:
+    """File and line of a plugin's code that an error comes from; empty where it is none of a plugin."""
+    modules = {sys.modules[name] for names in _listed_by.values() for name in names if name in sys.modules}
+    files = {getattr(module, "__file__", None) for module in modules}
+    lines = [frame for frame in traceback.extract_tb(fault.__traceback__) if frame.filename in files]
+    return f"{Path(lines[-1].filename).name}, line {lines[-1].lineno}" if lines else ""
 
 
 def digests() -> dict[str, str | None]:

@@ -22,8 +22,9 @@ class Status(Enum):
     STEP_TOO_SMALL = (
         "The step size fell to the resolution of time without meeting the tolerance: the force jumps there (a "
         "discontinuous law switching back and forth), its derivative has no bound (tangent damping of rollers that "
-        "meet and part), or the motion grows without bound. Take a continuous damping law, of rollers one-sided or "
-        "Hunt-Crossley, a looser rtol, or check initial state and parameters."
+        "meet and part), or the motion grows without bound, as by damping that gives energy (ballpass.testing finds "
+        "it). Take a continuous damping law, of rollers one-sided or Hunt-Crossley, a looser rtol, or check initial "
+        "state and parameters."
     )
     TOO_MANY_STEPS = (
         "The run took more steps than allowed. Take a shorter run or a looser rtol, and check damping and stiffness: "

@@ -15,6 +15,7 @@ from ballpass.derive.scene.keys import Fill, QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import Either, number, read_keys
 from ballpass.derive.scene.table import Table
+from ballpass.derive.scene.units import check_unit
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -42,6 +43,10 @@ class DampingLaw(ABC):
     kinked_at_rest: ClassVar[bool] = False
     keys: ClassVar[Mapping[str, QuantityKey]] = MappingProxyType({})
     one_of: ClassVar[tuple[Either, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        for unit in (cls.unit, *(key.unit for key in cls.keys.values())):
+            check_unit(unit)
 
     def read(self, table: Table, fill: Fill) -> tuple[SceneNumber, ...]:
         """The law's numbers out of ``[bearing.damping]``; faults are noted.

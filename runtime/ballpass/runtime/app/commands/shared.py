@@ -31,6 +31,7 @@ from ballpass.runtime.contract.errors import BallpassError, RequestError, printa
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.contract.folder import ForeignFolderError, read_manifest
 from ballpass.runtime.contract.folders import nearest
+from ballpass.runtime.contract.plugins import place_of
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.text import WIDTH
@@ -111,6 +112,11 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
     except KeyboardInterrupt:
         say_interrupted()
         raise typer.Exit(130) from None
+    except Exception as fault:
+        if not (place := place_of(fault)):
+            raise
+        complain(f"{place}, a plugin: {type(fault).__name__}: {fault}. Correct it; ballpass.testing has checks.")
+        raise typer.Exit(2) from fault
 
 
 def warn_of_scene(manifest: Manifest) -> None:
