@@ -102,7 +102,7 @@ def export_c(
         replace_file(target / name, text.encode())
     sources = [name for name in sorted(texts) if name.endswith(".c") and name != "example.c"]
     for other in others:
-        progress(f"compiling for {other}")
+        progress(f"compiling for {other}; the first time takes a minute or two, for zig's own libraries")
         program = f"{_program(manifest)}-{other}{TARGETS[other].program}"
         with tempfile.TemporaryDirectory() as made:
             for name, text in texts.items():

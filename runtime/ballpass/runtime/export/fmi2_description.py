@@ -57,6 +57,8 @@ def fmi2_description(given: Xml.Element, sources: Iterable[str]) -> Xml.Element:
             names = [f"{names[0]}[{k + 1}]" for k in range(int(dimension.attrib["start"]))]
         for k, name in enumerate(names):
             own = {key: text for key, text in item.attrib.items() if key not in (*_REAL, "derivative")}
+            if len(names) > 1:
+                own["description"] += f" ({k + 1})"
             own |= {"name": name, "valueReference": str(int(reference) + behind + k)}
             number = Xml.SubElement(Xml.SubElement(variables, "ScalarVariable", own), "Real")
             number.attrib.update({key: item.attrib[key] for key in _REAL if key in item.attrib})

@@ -268,7 +268,7 @@ def _binaries(
             target = TARGETS[other]
             if target.place == here:
                 continue
-            progress(f"compiling for {other}")
+            progress(f"compiling for {other}; the first time takes a minute or two, for zig's own libraries")
             made = f"{identifier}{target.library}"
             flags = [flag for flag in LIBRARY_FLAGS if flag != "-fPIC" or target.library != ".dll"]
             flags += ["-s"]  # without the paths of files here

@@ -51,13 +51,14 @@ def model_description(
     """
     parameters = {info.name: info for info in manifest.parameters}
     names = [*parameters, *(info.name for info in manifest.outputs), *(info.name for info in manifest.states)]
+    laws = dict.fromkeys(bearing.damping.law for bearing in manifest.bearings)
     structured = all(_STRUCTURED.fullmatch(name) for name in names)
     root = Xml.Element(
         "fmiModelDescription",
         fmiVersion="3.0",
         modelName=manifest.title or manifest.scene,
         instantiationToken=token,
-        description=f"Scene {manifest.scene}",
+        description=f"Scene {manifest.scene}" + (f", damping of ball contacts: {' and '.join(laws)}" if laws else ""),
         generationTool=f"ballpass {__version__}",
         variableNamingConvention="structured" if structured else "flat",
     )
@@ -81,7 +82,7 @@ def model_description(
     duration, step = experiment(manifest)
     rtol = repr(manifest.run.rtol)
     Xml.SubElement(
-        root, "DefaultExperiment", startTime="0", stopTime=repr(duration), tolerance=rtol, stepSize=repr(step)
+        root, "DefaultExperiment", startTime="0", stopTime=repr(duration), tolerance=rtol, stepSize=f"{step:.12g}"
     )
     _structure(root, manifest, _variables(root, manifest, inputs, magnitudes), known, inputs)
     return root
