@@ -176,12 +176,16 @@ def measure_simplification(
     known = np.quantile(np.max(doubt, axis=0), PROMISED, axis=0)
     largest = np.maximum(np.quantile(np.abs(changes), PROMISED, axis=0, method="higher"), known)
 
+    titles = [each.manifest.title for each in (model, simpler)]
+    if titles[0] == titles[1]:
+        titles = [each.manifest.scene for each in (model, simpler)]
+
     def by_name(numbers: np.ndarray) -> dict[str, float]:
         return dict(zip(names, numbers.tolist(), strict=True))
 
     return Simplification(
-        title=model.manifest.title,
-        simpler_title=simpler.manifest.title,
+        title=titles[0],
+        simpler_title=titles[1],
         quantities=names,
         units={item.name: item.unit for item in compared[0]},
         meanings={item.name: quantity_words(model.manifest, item) for item in compared[0]},
