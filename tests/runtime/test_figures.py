@@ -367,6 +367,13 @@ def test_spectrum_lines_equal_fourier_integrals_of_the_run(press: Run) -> None:
     assert "within one line; separating them takes 20 turns" in text
 
 
+def test_turns_that_are_left_out_do_not_count_for_figures(make_model: Callable[..., Model]) -> None:
+    """A spectrum of 40 turns after 80 that settle is one of 40 turns."""
+    rotor = make_model("rotor")
+    assert run_for_figures(rotor, rotor.simulate(120, transient=80)) is not None
+    assert run_for_figures(rotor, rotor.simulate(121, transient=20)) is None
+
+
 def test_a_run_of_many_turns_separates_ball_pass_from_the_third_harmonic(press: Run) -> None:
     longer = run_for_figures(*press)
     assert longer is not None

@@ -44,7 +44,7 @@ def run_for_figures(model: Model, solution: Solution) -> Solution | None:
     if not repetition.holds(repetition.driver.after(solution.transient_cycles)):
         return None
     turns = turns_to_separate(solution.manifest, numbers)
-    if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
+    if done - solution.transient_cycles >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
         return None
     rings = tuple(f"{b.prefix}{ring}." for b in solution.manifest.bearings for ring in ("inner", "outer"))
     wanted = [name for name in solution.outputs if name.startswith(rings) and name.endswith(("x", "y"))]
