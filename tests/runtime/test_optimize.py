@@ -44,6 +44,17 @@ def test_a_kink_in_two_variables_is_hit_from_any_start(minimized: Search) -> Non
         assert found.converged
 
 
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.9])
+def test_a_limit_is_kept_that_costs_much_of_the_goal(start: float) -> None:
+    """Least 12 x where x is a half or more: of a toggle clamp that must press, the torque; it was called impossible."""
+    found = minimize_by_planes(
+        _planes(lambda x: (12.0 * float(x[0]), np.array([12.0])), lambda x: (0.5 - float(x[0]), np.array([-1.0]))),
+        np.array([start]),
+    )
+    assert found.best.x == pytest.approx([0.5], abs=1e-7)
+    assert found.multipliers == pytest.approx([12.0])
+
+
 @pytest.mark.parametrize(
     ("goal", "kind"),
     [

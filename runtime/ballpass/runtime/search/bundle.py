@@ -24,7 +24,7 @@ BOX, DONE, EVALUATIONS = 0.1, 1e-7, 300
 NEAR = 4.5
 
 #: Share of the promised decrease that a step must give; planes kept; penalty of a violated constraint.
-ENOUGH, PLANES, PENALTY = 0.1, 24, 10.0
+ENOUGH, PLANES, PENALTY = 0.1, 24, 1e3
 
 #: Distances from the optimum at which both sides of it are compared [1].
 BESIDE, NEARER = 1e-5, 1e-6
