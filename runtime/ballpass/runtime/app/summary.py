@@ -255,9 +255,9 @@ def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
     prefixes = [bearing.prefix for bearing in sol.manifest.bearings]
     of_balls = [prefix + name for prefix in prefixes for name in _BALL_FORCES.values()]
     wanted: list[tuple[str, Kind]] = [(name, "max") for name in of_balls if name in sol.outputs]
-    forces = ("reaction.", "drive_torque", *(f"{prefix}load." for prefix in prefixes))
+    forces = ("reaction.", "stop.", "spring.", "drive_torque", *(f"{prefix}load." for prefix in prefixes))
     for info in sol.manifest.outputs:
-        if info.name in sol.outputs and info.name.startswith(forces):
+        if info.name in sol.outputs and info.name.startswith(forces) and info.unit in ("N", "N*m"):
             wanted += [(info.name, "min"), (info.name, "max")]
     if not wanted:
         return {}
@@ -265,7 +265,7 @@ def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
 
 
 def _forces(model: Model, sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
-    """Extremes of reactions, load and drive torque; the work of the drive."""
+    """Extremes of reactions, stops, springs, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
         if (info.name, "min") in peaks:

@@ -36,6 +36,7 @@ _ADDED = {
 #: What a reader wants first, by the beginnings of names behind that of a bearing; other rows are shown on request.
 _FIRST = (
     ("peak_ball_force.total",),
+    ("stop.", "spring."),
     ("reaction.", "load."),
     ("drive_torque", "drive_work", "drive_power"),
     ("driver.",),
@@ -95,8 +96,7 @@ def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping
         force, time = peak["total"], peak["time"]["total"]
         place = f"{rated_element(bearing).noun} {peak['ball']['total']} at {time:.5g} s"
         if not is_free(manifest):
-            turning = "crank" if manifest.mechanism is not None else "shaft"
-            place += f", {turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
+            place += f", {manifest.turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
         element = rated_element(bearing)
         whose = f" of {bearing.name}" if bearing.name else ""
         said.append(f"Highest {element.noun} force{whose}: {written(peak, 'total', 1.0)} N ({place})")

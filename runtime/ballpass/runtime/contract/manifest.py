@@ -422,6 +422,30 @@ class Manifest(ShortRepr):
         return self.bearings[0] if self.bearings else None
 
     @property
+    def turning(self) -> str:
+        """What angles of driver or shaft are of.
+
+        Examples
+        --------
+        >>> model.manifest.turning
+        'crank'
+        """
+        if self.mechanism is None:
+            return "shaft"
+        return "phase of the swing" if self.mechanism.swing else "crank"
+
+    @property
+    def angle_words(self) -> str:
+        """The angle of driver or shaft on an axis.
+
+        Examples
+        --------
+        >>> model.manifest.angle_words
+        'crank angle'
+        """
+        return {"shaft": "angle of the shaft", "crank": "crank angle"}.get(self.turning, self.turning)
+
+    @property
     def integrated(self) -> bool:
         """Whether there are states; without them all follows from the driver's angle."""
         return bool(self.initial)

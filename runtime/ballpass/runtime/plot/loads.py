@@ -71,7 +71,7 @@ def load_curve(record: Record) -> Figure:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.05 * (high - low))
     for axes in panels[-1:] if with_torque else panels[-2:]:
-        axes.set_xlabel("crank angle [°]")
+        axes.set_xlabel(f"{record.manifest.angle_words} [°]")
     handles, labels = panels[0].get_legend_handles_labels()
     legend_above(figure, handles, labels)
     shaded = " Shaded: an applied load acts." if windows else ""

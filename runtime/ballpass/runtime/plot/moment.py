@@ -54,7 +54,7 @@ def peak_moment(record: Record) -> Figure:
         text += ". "
     when = f"At t = {record.t[sample] * 1e3:.4g} ms"
     if with_mechanism:
-        when += f", crank angle {np.degrees(past(record.crank_angle()[sample])):.1f}°"
+        when += f", {record.manifest.angle_words} {np.degrees(past(record.crank_angle()[sample])):.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
     title = record.title(f"{subject} at the {reason}") + (_between_samples(record) if with_bearing else "")
     frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.8 if on_paper else 0.3, below=0.1)

@@ -134,7 +134,7 @@ class Record:
         if not self.turns:
             return 1e3 * self.t[window], "time [ms]"
         angle = np.degrees(self.crank_angle()[window])
-        label = "crank angle [°]" if self.manifest.mechanism is not None else "angle of the shaft [°]"
+        label = f"{self.manifest.angle_words} [°]"
         return angle - 360.0 * np.floor(min(angle[0], angle[-1]) / 360.0 + 1e-9), label
 
     def load_windows(self) -> tuple[tuple[float, float], ...]:

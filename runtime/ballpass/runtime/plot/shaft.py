@@ -70,7 +70,7 @@ def shaft_loads(record: Record) -> Figure:
     grid[1].set_xlabel("place along the shaft [mm]")
     when = f"At t = {record.t[sample] * 1e3:.4g} ms"
     if record.manifest.mechanism is not None:
-        when += f", crank angle {np.degrees(past(record.crank_angle()[sample])):.1f}°"
+        when += f", {record.manifest.angle_words} {np.degrees(past(record.crank_angle()[sample])):.1f}°"
     text = f"{when}: forces on the shaft, of its bearings (red)"
     text += ", and of joints and loads that have a place along it (brown)" * bool(applied)
     whole = replace(record, bearing=None)  # the figure is of all bearings

@@ -155,7 +155,8 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
     return (
         f"{name} swings: its inner ring has no mean speed against the outer one. ISO 281 and ISO 16281 hold for "
         "bearings that turn. Watch for fretting (false brinelling) at the places where the rolling elements stand; "
-        "judge the load by the static safety."
+        "judge the load by the static safety. It holds for rolling elements that begin where ball_angle says: vary "
+        "that over a pitch."
     )
 
 
