@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.cli import app
 
 AMPLITUDE, FREQUENCY, MEAN = math.radians(40.0), 1.5, math.radians(60.0)
 RATE = 2.0 * math.pi * FREQUENCY
@@ -168,6 +171,23 @@ def test_the_balls_of_a_bearing_roll_to_and_fro(model_of: Callable[..., Model]) 
     turned = np.unwrap(run["cage.in_outer"], period=2.0 * math.pi)
     expected = share * AMPLITUDE * np.sin(RATE * run.t)
     np.testing.assert_allclose(turned - turned[0], expected, atol=1e-10)
+
+
+@pytest.mark.long
+def test_a_run_of_a_swing_leaves_out_few_periods_and_has_no_turns(
+    model_of: Callable[..., Model], tmp_path: Path
+) -> None:
+    """It left out 50, though balls are where they were after one.  Angles are of its phase; a life has no turns."""
+    text = ROCKERS.replace("[run]", BEARING).replace("cycles = 1\ntransient_cycles = 0\n", "")
+    model = model_of(text)
+    settings = model.run_settings
+    assert settings.transient_cycles < 8.0
+    assert settings.cycles == settings.transient_cycles + 10.0
+    assert model.manifest.angle_words == "phase of the swing"
+    (tmp_path / "swing.toml").write_text(text, encoding="utf-8")
+    done = CliRunner().invoke(app, ["select", str(tmp_path / "swing.toml"), "--life", "1 h"])
+    assert done.exit_code == 2
+    assert "swings. Allowed: a bearing that turns, or static safety without --life" in done.stderr
 
 
 @pytest.mark.parametrize(

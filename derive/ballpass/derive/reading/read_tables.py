@@ -87,7 +87,10 @@ def read_tables(root: Table, name: str) -> Scene:
         # rows of equal speed are those of a constant one
         unlike = {q.value for q in (mechanism.driver.speed, *speeds.later_speed)} if mechanism and speeds else set()
         span = speeds.time[-1].value if speeds is not None and len(unlike) > 1 else None
-        run, outputs = _read_run(root.table("run", required=False), cycle * math.ceil(STEADY_CYCLES / cycle), span)
+        # of a swing a transient that does not suffice is doubled from a period on: balls are then where they were
+        dropped = DROPPED_CYCLES if mechanism is None or mechanism.driver.swing is None else 1.0
+        steady = cycle * math.ceil(STEADY_CYCLES / cycle)
+        run, outputs = _read_run(root.table("run", required=False), dropped, steady, span)
         given = root.data.get("run")
         turns = {"cycles", "duration", "transient_cycles"}.intersection(given if isinstance(given, dict) else ())
         transient = "transient_cycles" in turns
@@ -143,10 +146,11 @@ def _turns_of_loads(
     return math.lcm(1, *counts)
 
 
-def _read_run(table: Table, steady: int, span: float | None) -> tuple[RunSettings, tuple[str, ...]]:
+def _read_run(table: Table, dropped: float, steady: int, span: float | None) -> tuple[RunSettings, tuple[str, ...]]:
     """Length, samples and method of a run, and the names of its outputs.
 
-    Without a length it takes the `span` of a table in which the speed changes [s], or else `steady` turns count.
+    Without a length it takes the `span` of a table in which the speed changes [s], or else `steady` turns count, behind
+    `dropped` at least.
     """
     if table.missing:  # not a fault
         table = Table(table.collector, table.path, {})
@@ -155,7 +159,7 @@ def _read_run(table: Table, steady: int, span: float | None) -> tuple[RunSetting
         if run.cycles is None and run.duration is None and span is not None:
             run = replace(run, duration=span)
         elif run.cycles is None and run.duration is None:
-            dropped = run.transient_cycles if "transient_cycles" in table.data else DROPPED_CYCLES
+            dropped = run.transient_cycles if "transient_cycles" in table.data else dropped
             run = replace(run, cycles=dropped + steady, transient_cycles=dropped)
         return run, read_keys(table, {"outputs": OUTPUTS})["outputs"]
 

@@ -17,10 +17,12 @@ from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.options import Cycles, Option, Rtol, Transient
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.ratings.of_bearing import why_no_life
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.show.progress import Progress, shown
+from ballpass.runtime.time.timeline import shaft_speed
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.designations import BearingType
@@ -190,6 +192,9 @@ def select(
             f"--set {', '.join(refused)}: bearings of the tables have their own. Allowed: numbers that no designation "
             "gives, and a group of clearance in the scene."
         )
+    values = model.numbers(parameters).values
+    if life is not None and not model.manifest.duty:  # whose states may turn
+        _refuse_without_life(why_no_life(info, values, shaft_speed(model.manifest, values)))
     found = []
     with shown("choosing", progress) as tell:
         for done, kind in enumerate(kinds):
@@ -220,6 +225,11 @@ def select(
     )
 
 
+def _refuse_without_life(why: str, *_: str) -> None:
+    if why:
+        raise RequestError(f"{why.partition(':')[0]}. Allowed: a bearing that turns, or static safety without --life.")
+
+
 def _room(one: Candidate) -> float:
     return one.outside_diameter**2 * one.width
 
@@ -229,10 +239,7 @@ def _judged(candidate: Candidate, report: LifeReport, name: str, life: float | N
     states = [one for state in report.states for one in state.bearings if one.name == name]
     why = [one.why_no_life for one in states if one.why_no_life]
     if not states or (life is not None and len(why) == len(states)):  # of the motion, so with each bearing
-        why = why or ["Nothing turns in any state"]
-        raise RequestError(
-            f"{why[0].partition(':')[0]}. Allowed: a bearing that turns, or static safety without --life."
-        )
+        _refuse_without_life(*why[:1], "Nothing turns in any state")
     reached = states[0].reached
     lives = [one.modified_hours or one.hours for one in report.duty if one.name == name]
     (hours,) = lives or [None if reached is None else states[0].hours(reached)]
