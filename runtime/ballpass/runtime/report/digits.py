@@ -39,8 +39,11 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 #: But for times and angles of a peak, which may be as high elsewhere.
 _PLUS_MINUS = re.compile(rf"({_NUMBER.pattern})\s±({_NUMBER.pattern})(?! s\b| deg\b)")
 
-#: A place whose element is another in each answer: the time and angle beside it say nothing either.
+#: A place whose element is another in each answer: the time and angle beside it say nothing either.  A time or angle of
+#: a place, and its largest ± over it: of peaks that come again, each answer may have another one [1].
 _NOWHERE = re.compile(r"\([a-z]+ -?\d+ ±\d+ at [^()]*\)")
+_MOMENT = re.compile(r"(?: at|,(?: [a-z ]+ at)?) (-?\d\S*) ±(\d\S*) (?:s|deg)\b(?: of [a-z ]+)?")
+LOOSE = 0.1
 
 
 def second_tolerance(rtol: float) -> float:
@@ -110,6 +113,8 @@ def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) ->
     ('4390.5 ±0.8 N (ball 3 or 5)', '0.05 ±0.04')
     >>> shared_text([f"320 N (ball {k} at 0.{k} s)" for k in (1, 5, 8)])
     '320 N (elsewhere at each tolerance)'
+    >>> shared_text([f"320 N (ball 3 at {t} s, crank at 81.02 deg)" for t in (1.2, 2.2, 3.2)])
+    '320 N (ball 3, crank at 81.02 deg)'
     """
     words = _NUMBER.split(texts[0])
     if len(set(texts)) == 1 or any(_NUMBER.split(text) != words for text in texts):
@@ -118,7 +123,8 @@ def shared_text(texts: Sequence[str], between: str = " ", least: int = LEAST) ->
     between = between if len(words) == 2 and len("".join(words)) < 2 else " "  # with a star at most
     found = [_shared_number(each, between, least) for each in numbers]
     joined = "".join(part for pair in zip(words, [*found, ""], strict=True) for part in pair)
-    return _NOWHERE.sub("(elsewhere at each tolerance)", joined)
+    joined = _NOWHERE.sub("(elsewhere at each tolerance)", joined)
+    return _MOMENT.sub(lambda found: "" if float(found[2]) > LOOSE * abs(float(found[1])) else found[0], joined)
 
 
 def _shared_number(texts: Sequence[str], between: str, least: int) -> str:
