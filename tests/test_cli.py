@@ -399,8 +399,10 @@ def test_equations_are_markdown_with_the_matrix_of_eq_1(ballpass: Callable[..., 
     assert "`bearing.clearance`" in result.stdout
     assert result.stdout.endswith("\n")
     assert not list(tmp_path.iterdir())
-    # what is committed beside the C is the same text
-    assert result.stdout == (ROOT / "generated" / "punching_press" / "EQUATIONS.md").read_text(encoding="utf-8")
+    # what is committed beside the C is the same text without values, which are the scene's
+    assert re.search(r"\| `bearing.clearance` \| 1e-05 \| m \|", result.stdout)
+    committed = (ROOT / "generated" / "punching_press" / "EQUATIONS.md").read_text(encoding="utf-8")
+    assert result.stdout.partition("## States")[2] == committed.partition("## States")[2]
 
 
 def test_bearings_that_can_be_named_are_printed_within_80_columns(
