@@ -23,7 +23,6 @@ from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
-    Pair,
     Play,
     Pose,
     Turn,
@@ -35,6 +34,7 @@ from ballpass.derive.mechanism.kinematics import (
     place,
     subscript,
 )
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 from ballpass.derive.scene.table import FRAME

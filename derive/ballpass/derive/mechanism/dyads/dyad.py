@@ -21,21 +21,15 @@ from ballpass.derive.mechanism.balance import Balance, Guide, Mesh
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
-    Pair,
     Play,
     Pose,
-    add,
-    cross,
     displaced,
-    dot,
     joint_point,
     name_joint,
     name_turn,
-    quarter_turn,
-    scale,
     subscript,
-    subtract,
 )
+from ballpass.derive.mechanism.vectors import Pair, add, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 from ballpass.derive.terms import symbol_of

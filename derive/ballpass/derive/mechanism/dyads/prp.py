@@ -21,21 +21,8 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_travels,
     slid,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    add,
-    carried,
-    displaced,
-    dot,
-    joint_point,
-    name_joint,
-    place,
-    quarter_turn,
-    scale,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, displaced, joint_point, name_joint, place
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 

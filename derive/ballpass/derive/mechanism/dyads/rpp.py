@@ -23,20 +23,8 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_travels,
     slid,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    add,
-    carried,
-    dot,
-    joint_point,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, joint_point, place, subscript
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 

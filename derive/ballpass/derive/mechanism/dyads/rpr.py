@@ -26,22 +26,8 @@ from ballpass.derive.mechanism.dyads.dyad import (
     name_rate,
     name_travel,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    Turn,
-    add,
-    cross,
-    dot,
-    joint_point,
-    name_turn,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, joint_point, name_turn, place, subscript
+from ballpass.derive.mechanism.vectors import add, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 

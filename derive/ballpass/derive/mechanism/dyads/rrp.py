@@ -36,18 +36,13 @@ from ballpass.derive.mechanism.kinematics import (
     Play,
     Pose,
     Turn,
-    add,
     carried,
-    cross,
-    dot,
     joint_point,
     name_joint,
     place,
-    quarter_turn,
-    scale,
     subscript,
-    subtract,
 )
+from ballpass.derive.mechanism.vectors import add, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 

@@ -27,21 +27,8 @@ from ballpass.derive.mechanism.dyads.dyad import (
     span_length,
     turn_by_span,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    Turn,
-    add,
-    carried,
-    dot,
-    name_joint,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, carried, name_joint, place, subscript
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 
