@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ballpass.derive.mechanism.balance import Balance, Guide
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Placement,
+from ballpass.derive.mechanism.dyads.closure import name_gap
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Placement, name_hinge
+from ballpass.derive.mechanism.dyads.guides import (
     guide_axis,
     name_crossing,
     name_direction,
-    name_gap,
-    name_hinge,
     name_path,
     name_travels,
     slid,
