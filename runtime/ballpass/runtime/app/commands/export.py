@@ -17,11 +17,11 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import generated_folder, read_asked
+from ballpass.runtime.app.commands.messages import note
 from ballpass.runtime.app.commands.shared import (
     check_folder,
     command,
     name_of,
-    note,
     read_own,
     speed_over_time,
     warn_of_scene,

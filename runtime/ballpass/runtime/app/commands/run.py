@@ -10,19 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
-from ballpass.runtime.app.commands.shared import (
-    Stages,
-    can_draw,
-    command,
-    load_model,
-    note,
-    results_folder,
-    show_files,
-    show_json,
-    show_parts,
-    size_words,
-    warn,
-)
+from ballpass.runtime.app.commands.messages import note, show_files, show_json, show_parts, size_words, warn
+from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import CHOICE, OWN, STEPPERS
