@@ -15,15 +15,7 @@ from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import CHOICE, OWN, STEPPERS
-from ballpass.runtime.contract.options import (
-    Cycles,
-    Duration,
-    Option,
-    Rtol,
-    SampleRate,
-    options_in,
-    refuse_unknown,
-)
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate, options_in, refuse_unknown
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
 from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions import option_names
