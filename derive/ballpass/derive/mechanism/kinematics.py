@@ -15,12 +15,7 @@ from ballpass.derive.mechanism.vectors import ZERO, Pair, add, quarter_turn, rot
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Body, Joint, Mechanism
 from ballpass.derive.scene.quantity import Vector
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import Definition, components, symbol_of
-
-
-def subscript(name: str) -> str:
-    """A scene name as an upright LaTeX subscript."""
-    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+from ballpass.derive.terms import Definition, components, subscript, symbol_of
 
 
 class AxialPoint(tuple[sp.Expr, sp.Expr]):

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from ballpass.derive.mechanism.kinematics import Ledger, Motion, joint_point, name_turn, subscript
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, joint_point, name_turn
 from ballpass.derive.mechanism.vectors import Pair, cross, dot, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
+from ballpass.derive.terms import subscript
 
 
 def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:

@@ -18,18 +18,10 @@ from typing import ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance, Guide, Mesh
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Motion,
-    Play,
-    Pose,
-    displaced,
-    joint_point,
-    name_joint,
-    subscript,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, Play, Pose, displaced, joint_point, name_joint
 from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
+from ballpass.derive.terms import subscript
 from ballpass.derive.variables import Words
 
 

@@ -7,10 +7,10 @@ from typing import Literal
 import sympy as sp
 
 from ballpass.derive.mechanism.dyads.dyad import Margin
-from ballpass.derive.mechanism.kinematics import Ledger, Motion, Pose, joint_point, subscript
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, Pose, joint_point
 from ballpass.derive.mechanism.vectors import Pair, add, cross, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript, symbol_of
 
 
 def guide_axis(guide: Joint) -> Pair:

@@ -21,9 +21,10 @@ from ballpass.derive.mechanism.dyads.guides import (
     name_travels,
     slid,
 )
-from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, joint_point, place, subscript
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, joint_point, place
 from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.terms import subscript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
