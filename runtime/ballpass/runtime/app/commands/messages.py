@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ballpass.runtime.contract.errors import printable
+from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.report.plain import json_text
 from ballpass.runtime.report.report import Report, ReportTable, Words
 from ballpass.runtime.report.text import WIDTH
@@ -34,6 +35,13 @@ def warn(message: Warning | str) -> None:
 def note(message: str) -> None:
     """Print a remark on stderr."""
     _say("[bold]note[/]", message)
+
+
+def warn_of_scene(manifest: Manifest) -> None:
+    """Warn of a scene's unusual numbers, for commands that compute nothing."""
+    from ballpass.runtime.contract.plausible_ranges import warn_unusual
+
+    warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
 
 
 def _say(kind: str, message: str) -> None:

@@ -110,13 +110,6 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
         raise typer.Exit(2) from fault
 
 
-def warn_of_scene(manifest: Manifest) -> None:
-    """Warn of a scene's unusual numbers, for commands that compute nothing."""
-    from ballpass.runtime.contract.plausible_ranges import warn_unusual
-
-    warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
-
-
 class Stages:
     """Progress on stderr: on a terminal bars that move, elsewhere a line when a stage begins and while it lasts."""
 
