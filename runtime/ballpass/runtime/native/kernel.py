@@ -17,9 +17,10 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.native.c_calls import declare
 from ballpass.runtime.native.compile import compile_sources
 from ballpass.runtime.native.compilers import Compiler
-from ballpass.runtime.native.driver_library import DRIVER, declare
+from ballpass.runtime.native.driver_library import DRIVER
 
 Array = NDArray[np.float64]
 
