@@ -39,6 +39,9 @@ PROGRAM_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRA
 #: Flags of a library for any processor of a kind.
 LIBRARY_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag != "-O1"), *FLAGS[1:], "-fvisibility=hidden")
 
+#: Files of the program that an FMU and a page do not need.
+PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
+
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
 #: Includes that a program that only simulates does not need.
