@@ -27,8 +27,8 @@ from linkages import (
 from quick_cases import long_but
 
 from ballpass.derive.mechanism.evaluator import Evaluator
-from ballpass.derive.mechanism.kinematics import dot
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
+from ballpass.derive.mechanism.vectors import dot
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 

@@ -11,9 +11,9 @@ from fnmatch import fnmatchcase
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.mechanism.kinematics import Pair
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Output, Words

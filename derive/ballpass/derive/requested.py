@@ -16,11 +16,11 @@ import sympy as sp
 from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.mechanism.balance import AppliedLoad
-from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.mechanism.vectors import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.outputs import made, named_rings
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import Definition, Names, symbol_of

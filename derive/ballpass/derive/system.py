@@ -30,12 +30,13 @@ from ballpass.derive.bearing.two_way import Coupled, carriers_of, couple, on_til
 from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import NO_FORCES, Forces, derive_forces
-from ballpass.derive.mechanism.kinematics import Motion, Pair
+from ballpass.derive.mechanism.kinematics import Motion
 from ballpass.derive.mechanism.linear_forms import Effort, EquationsOfMotion, Inertia, LinearForms
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
 from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, weights_of, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.swing import STILL, Swing, swing_of, with_driver
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.requested import (
     balance_outputs,

@@ -119,6 +119,11 @@ def names_of(bearing: Bearing) -> Names:
     return Names(prefix=bearing.prefix, path=bearing.path, element=bearing.element)
 
 
+def subscript(name: str) -> str:
+    """A scene name as an upright LaTeX subscript."""
+    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+
+
 def symbol_of(quantity: SceneNumber) -> sp.Symbol:
     """Symbol of a scene quantity: its path, so that two quantities can never share one."""
     return sp.Symbol(quantity.path, real=True)

@@ -18,8 +18,9 @@ import sympy as sp
 from ballpass.derive.bearing.equations import ring_coordinates
 from ballpass.derive.bearing.ring_load import RingLoad
 from ballpass.derive.bearing.two_way import Coupled, ring
-from ballpass.derive.mechanism.kinematics import Ledger, Motion, add, displaced, dot, scale
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, displaced
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.vectors import add, dot, scale
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Mechanism
 from ballpass.derive.scene.quantity import SceneNumber

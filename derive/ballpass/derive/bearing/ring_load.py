@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.kinematics import ZERO, Pair, add, scale
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.mechanism.vectors import ZERO, Pair, add, scale
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import Scene

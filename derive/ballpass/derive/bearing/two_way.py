@@ -17,21 +17,10 @@ import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.mechanism.balance import AppliedLoad
-from ballpass.derive.mechanism.kinematics import (
-    AT_REST,
-    ZERO,
-    Motion,
-    Pair,
-    add,
-    body_point,
-    cross,
-    displaced,
-    quarter_turn,
-    scale,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import AT_REST, Motion, body_point, displaced
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.vectors import ZERO, Pair, add, cross, quarter_turn, scale, subtract
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.mechanism_records import Joint
 from ballpass.derive.scene.table import FRAME

@@ -353,10 +353,8 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
 
     def place(angle: ca.SX) -> int | None:
         """Number of an angle; None where it is no linear function of time."""
-        taken = ca.vertcat(*cosines, *sines)  # functions of time as well
+        taken = ca.vertcat(*cosines, *sines)  # of which the angle of a body that swings is a function, as of time
         if not ca.depends_on(angle, t) or ca.depends_on(ca.jacobian(angle, t), t) or ca.depends_on(angle, taken):
-            return None
-        if ca.depends_on(angle, ca.vertcat(*cosines, *sines)):  # of a body that swings with one of these angles
             return None
         for k, known in enumerate(angles):
             if ca.is_equal(known, angle, 4):

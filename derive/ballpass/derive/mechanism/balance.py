@@ -14,22 +14,11 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.mechanism.kinematics import (
-    ZERO,
-    Ledger,
-    Pair,
-    Pose,
-    add,
-    cross,
-    joint_point,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Pose, joint_point
+from ballpass.derive.mechanism.vectors import ZERO, Pair, add, cross, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Joint, Mechanism
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import components, symbol_of
+from ballpass.derive.terms import components, subscript, symbol_of
 
 #: Torque of the drive on the driven body [N*m], counter-clockwise.
 DRIVE_TORQUE = sp.Symbol("drive_torque", real=True)

@@ -17,29 +17,12 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance, Mesh
 from ballpass.derive.mechanism.dyads.dyad import Group, Margin, Placement, name_acceleration, name_hinge, name_rate
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Pair,
-    Play,
-    Pose,
-    Turn,
-    add,
-    body_point,
-    cross,
-    dot,
-    joint_point,
-    name_turn,
-    place,
-    quarter_turn,
-    rotate,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, body_point, joint_point, name_turn, place
+from ballpass.derive.mechanism.vectors import Pair, add, cross, dot, quarter_turn, rotate, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Gear, Joint, Mechanism
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript, symbol_of
 from ballpass.derive.variables import Words
 
 

@@ -1,7 +1,7 @@
 """Plane motion of a rigid body in symbols, and the ledger of named definitions, which keeps expressions small.
 
 A `Ledger` turns an expression into a named symbol and remembers the definition; a `Pose` says where a body is and how
-it moves, and gives the motion of any of its points.  Vectors are pairs (x, y) of SymPy expressions.
+it moves, and gives the motion of any of its points.
 """
 
 from __future__ import annotations
@@ -11,50 +11,11 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from ballpass.derive.mechanism.vectors import ZERO, Pair, add, quarter_turn, rotate, scale, subtract
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Body, Joint, Mechanism
 from ballpass.derive.scene.quantity import Vector
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import Definition, components, symbol_of
-
-#: Plane vector: x and y components.
-Pair = tuple[sp.Expr, sp.Expr]
-
-ZERO: Pair = (sp.S.Zero, sp.S.Zero)
-
-
-def add(*vectors: Pair) -> Pair:
-    """Sum of plane vectors."""
-    return sp.Add(*(v[0] for v in vectors)), sp.Add(*(v[1] for v in vectors))
-
-
-def scale(factor: sp.Expr, vector: Pair) -> Pair:
-    """Vector times a scalar."""
-    return factor * vector[0], factor * vector[1]
-
-
-def subtract(left: Pair, right: Pair) -> Pair:
-    """Difference of plane vectors."""
-    return left[0] - right[0], left[1] - right[1]
-
-
-def dot(left: Pair, right: Pair) -> sp.Expr:
-    """Scalar product."""
-    return left[0] * right[0] + left[1] * right[1]
-
-
-def cross(left: Pair, right: Pair) -> sp.Expr:
-    """Component of the vector product out of the plane, positive counter-clockwise."""
-    return left[0] * right[1] - left[1] * right[0]
-
-
-def quarter_turn(vector: Pair) -> Pair:
-    """The vector turned by 90 degrees counter-clockwise."""
-    return -vector[1], vector[0]
-
-
-def subscript(name: str) -> str:
-    """A scene name as an upright LaTeX subscript."""
-    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+from ballpass.derive.terms import Definition, components, subscript, symbol_of
 
 
 class AxialPoint(tuple[sp.Expr, sp.Expr]):
@@ -142,12 +103,6 @@ class Pose(Turn):
         arm = self.rotate(subtract(point, self.anchor))
         moved = carried(self.anchor_motion, arm, self.rate, self.acceleration)
         return displaced(moved, self.slope, point.place if isinstance(point, AxialPoint) else 0)
-
-
-def rotate(cos: sp.Expr, sin: sp.Expr, vector: Pair) -> Pair:
-    """The vector turned counter-clockwise by the angle with this cosine and sine."""
-    x, y = vector
-    return cos * x - sin * y, sin * x + cos * y
 
 
 def carried(anchor: Motion, arm: Pair, rate: sp.Expr, acceleration: sp.Expr) -> Motion:

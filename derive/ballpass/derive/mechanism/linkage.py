@@ -23,7 +23,6 @@ from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
-    Pair,
     Play,
     Pose,
     Turn,
@@ -33,12 +32,12 @@ from ballpass.derive.mechanism.kinematics import (
     joint_point,
     name_turn,
     place,
-    subscript,
 )
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import Definition, subscript
 
 #: Joints that keep their two points together.
 NO_PLAY: Play = MappingProxyType({})

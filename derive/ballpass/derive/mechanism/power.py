@@ -9,9 +9,9 @@ from collections.abc import Iterable
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import AppliedLoad
-from ballpass.derive.mechanism.kinematics import ZERO
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.vectors import ZERO
 from ballpass.derive.terms import components, symbol_of
 
 

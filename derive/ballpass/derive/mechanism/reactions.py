@@ -17,8 +17,9 @@ from types import MappingProxyType
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance, Guide
-from ballpass.derive.mechanism.kinematics import Ledger, Pair, joint_point
+from ballpass.derive.mechanism.kinematics import Ledger, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.terms import Definition
 

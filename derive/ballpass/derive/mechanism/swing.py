@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.kinematics import Pair, rotate, subscript
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.terms import Definition, defined, symbol_of
+from ballpass.derive.mechanism.vectors import Pair, rotate
+from ballpass.derive.terms import Definition, defined, subscript, symbol_of
 from ballpass.derive.variables import Terms
 
 #: Angles of the driver at which the ideal linkage is evaluated.

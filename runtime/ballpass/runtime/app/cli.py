@@ -14,7 +14,8 @@ from typer.core import TyperGroup
 from ballpass.runtime.app.commands.command_list import ASK, COMMANDS, with_plugins
 from ballpass.runtime.app.commands.declared import Command, Plugins, as_command
 from ballpass.runtime.app.commands.mcp import mcp
-from ballpass.runtime.app.commands.shared import command, complain
+from ballpass.runtime.app.commands.messages import complain
+from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.app.commands.skill import skill
 from ballpass.runtime.contract.version import __version__
 

@@ -20,17 +20,7 @@ from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.folder import read_artefact, read_unchanged
 from ballpass.runtime.contract.folders import read_file, replace_file
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.export.scene_numbers import (
-    STANDALONE,
-    columns_of,
-    constants_source,
-    filled,
-    margins_of,
-    margins_source,
-    outputs_source,
-    scene_header,
-    scene_source,
-)
+from ballpass.runtime.export.scene_numbers import STANDALONE, columns_of, filled, margins_of, scene_texts
 from ballpass.runtime.export.targets import TARGETS, cross_compiled, targets_of
 from ballpass.runtime.native.compile import digests_of
 from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
@@ -48,6 +38,9 @@ PROGRAM_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRA
 
 #: Flags of a library for any processor of a kind.
 LIBRARY_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag != "-O1"), *FLAGS[1:], "-fvisibility=hidden")
+
+#: Files of the program that an FMU and a page do not need.
+PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
@@ -139,15 +132,7 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
             f"{manifest.scene}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
             "and what is exported does not find when. Allowed: a linkage that turns round, without a driver.range."
         )
-    texts = {
-        "scene.h": scene_header(manifest),
-        "scene.c": scene_source(manifest),
-        "constants.c": constants_source(model),
-        "outputs.c": outputs_source(model),
-        METHOD_TABLES: method_tables(),
-    }
-    if margins_of(manifest):
-        texts["margins.c"] = margins_source(model)
+    texts = {**scene_texts(model), METHOD_TABLES: method_tables()}
     extra = [STANDALONE / "located.c"] if has_kinks(manifest) else []
     extra += [STANDALONE / "assembly.c"] if margins_of(manifest) else []
     sources = (STANDALONE / "main.c", STANDALONE / "ballpass.c", DRIVER / "schedule.c", DRIVER / "stepper.c", *extra)

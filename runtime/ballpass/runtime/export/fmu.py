@@ -32,7 +32,7 @@ from ballpass.runtime.contract.folder import read_artefact
 from ballpass.runtime.contract.folders import replaced
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts, started
+from ballpass.runtime.export.c_program import LIBRARY_FLAGS, PROGRAM_ONLY, program_texts, started
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
 from ballpass.runtime.export.fmi2_description import fmi2_description
 from ballpass.runtime.export.model_description import SPEED, build_description, experiment, model_description
@@ -48,9 +48,6 @@ from ballpass.runtime.time.timeline import stretch
 
 #: C of the interface, the standard's headers, and the licence of both.
 FMI = DRIVER / "fmi"
-
-#: Files of the program that an FMU does not need.
-_PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
 
 #: Of the FMI.
 VERSIONS = (2, 3)
@@ -104,7 +101,7 @@ def export_fmu(
     others = targets_of(targets)
     model = started(place, manifest)
     manifest = model.manifest
-    sources = {name: text for name, text in program_texts(model).items() if name not in _PROGRAM_ONLY}
+    sources = {name: text for name, text in program_texts(model).items() if name not in PROGRAM_ONLY}
     sources |= _interface(model, version)
     token = _token(manifest, chosen, sources)
     sources["fmu.h"] = _fmu_header(manifest, token, chosen, version)

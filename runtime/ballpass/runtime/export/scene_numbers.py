@@ -82,7 +82,22 @@ def filled(template: Path, **values: str) -> str:
     return re.sub("@([A-Z]+)@", lambda found: values[found[1]], template.read_text(encoding="utf-8"))
 
 
-def scene_header(manifest: Manifest) -> str:
+def scene_texts(model: LoadedModel) -> dict[str, str]:
+    """Content of the files of a scene by name; ``margins.c`` where its linkage can lose its assembly."""
+    constants = model.symbolic("constants")
+    texts = {
+        "scene.h": _scene_header(model.manifest),
+        "scene.c": _scene_source(model.manifest),
+        "constants.c": behind("The derived constants", constants, "scene_constants", MOMENT[3:4], "c"),
+        "outputs.c": behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y"),
+    }
+    if margins_of(model.manifest):
+        margins, given = model.symbolic("assembly"), (MOMENT[0], *MOMENT[2:])
+        texts["margins.c"] = behind("The linkage's margins", margins, "scene_margins", given, "margins")
+    return texts
+
+
+def _scene_header(manifest: Manifest) -> str:
     """Text of ``scene.h``: declarations of the scene for the other files."""
     sizes = {
         "SCENE_STATES": len(manifest.states),
@@ -105,7 +120,7 @@ def scene_header(manifest: Manifest) -> str:
     )
 
 
-def scene_source(manifest: Manifest) -> str:
+def _scene_source(manifest: Manifest) -> str:
     """Text of ``scene.c``: the scene's numbers."""
     names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
     place = {name: k for k, name in enumerate(names)}
@@ -203,17 +218,6 @@ def _turnings(infos: Sequence[TurningInfo], place: dict[str, int]) -> tuple[list
     return arrays, "\n".join(entries) or "    {-1, -1, -1, -1, -1, -1, 0, NULL, NULL, 0, NULL, NULL}, /* none */"
 
 
-def constants_source(model: LoadedModel) -> str:
-    """C of ``constants``."""
-    given = (("const double *p", "p"),)
-    return behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
-
-
-def outputs_source(model: LoadedModel) -> str:
-    """C of the outputs that are no states."""
-    return behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y")
-
-
 def outputs_function(model: LoadedModel) -> casadi.Function:
     """Outputs that are no states, one below the other, over t, x, u, p and c."""
     graph = model.symbolic("outputs")
@@ -222,12 +226,6 @@ def outputs_function(model: LoadedModel) -> casadi.Function:
     computed = (casadi.densify(results[info.name]) for info in computed_outputs(model.manifest))
     rows = casadi.vertcat(casadi.SX(0, 1), *computed)
     return casadi.Function("outputs", [*arguments.values()], [rows], [*arguments], ["y"])
-
-
-def margins_source(model: LoadedModel) -> str:
-    """C of ``assembly``, in the same way."""
-    given = (("double t", "&t"), ("const double *u", "u"), ("const double *p", "p"), ("const double *c", "c"))
-    return behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
 
 
 #: Arguments of functions of a moment: declarations, and the addresses of the numbers.

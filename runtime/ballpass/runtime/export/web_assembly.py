@@ -11,7 +11,7 @@ from pathlib import Path
 import casadi
 
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.export.c_program import program_texts
+from ballpass.runtime.export.c_program import PROGRAM_ONLY, program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind, moment_symbols
 from ballpass.runtime.native.compilers import ZIG, need_zig, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
@@ -55,8 +55,7 @@ def web_assembly(model: LoadedModel) -> bytes:
     """
     check_compiler()
     symbolic = LoadedModel(model.folder, model.manifest, None)
-    texts = {name: text for name, text in program_texts(symbolic).items() if name.endswith((".c", ".h"))}
-    texts = {name: text for name, text in texts.items() if name not in ("main.c", "example.c")}
+    texts = {name: text for name, text in program_texts(symbolic).items() if name not in PROGRAM_ONLY}
     texts |= {name: (STANDALONE / name).read_text(encoding="utf-8") for name in ("page.c", "simulation.h")}
     texts |= {name: (DRIVER / name).read_text(encoding="utf-8") for name in ("reductions.h", "powers.h")}
     texts[REDUCTION_TABLES] = reduction_tables()

@@ -1,6 +1,6 @@
-"""What the compiled drivers share: where their C is, how it is compiled with a model's kernels, how it is called.
+"""What the compiled drivers share: where their C is, and how it is compiled with a model's kernels.
 
-In: a generated folder and the C of a driver.  Out: a library, checked against the manifest, and addresses for calls.
+In: a generated folder and the C of a driver.  Out: a library, checked against the manifest.
 """
 
 from __future__ import annotations
@@ -9,10 +9,6 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import DTypeLike
 
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.manifest import Manifest
@@ -104,16 +100,6 @@ def compile_driver(folder: Path, manifest: Manifest, compiler: Compiler, driver:
     )
 
 
-def input_columns(manifest: Manifest) -> int:
-    """Inputs as the drivers count them: at least one, for C knows no arrays without entries."""
-    return max(len(manifest.inputs), 1)
-
-
-def padded(inputs: np.ndarray, columns: int) -> np.ndarray:
-    """Inputs, shape (segments, inputs); zeros of shape (segments, columns) where a model has none."""
-    return inputs if inputs.shape[1] else np.zeros((len(inputs), columns))
-
-
 def open_driver(
     library: CompiledLibrary, sizes: str, numbers: int, records: Sequence[type[ctypes.Structure]]
 ) -> tuple[ctypes.CDLL, list[int]]:
@@ -154,37 +140,3 @@ def check_sizes(library: CompiledLibrary, what: str, found: Sequence[int], expec
             f"{library.path}: compiled for {list(found)} {what}, the manifest has {list(expected)}. Write the folder "
             "again."
         )
-
-
-def address(array: np.ndarray | None, kind: DTypeLike = np.float64) -> int | None:
-    """Address of an array's numbers, which must outlive its use; TypeError for other than contiguous ones of a kind."""
-    if array is None:
-        return None
-    if array.dtype != kind or not array.flags.c_contiguous:
-        raise TypeError(f"a C-contiguous array of {np.dtype(kind)} is expected, not {array.dtype}, {array.flags}")
-    found: int = array.ctypes.data
-    return found
-
-
-class ArrayOf:
-    """Argument of a C function that is an array of numbers, or None for no array.
-
-    Its address is passed as a number: making typed pointers would take as long as a hundred steps.
-    """
-
-    def __init__(self, kind: DTypeLike) -> None:
-        self._kind = np.dtype(kind)
-
-    def from_param(self, array: np.ndarray | None) -> ctypes.c_void_p:
-        """What ctypes passes for an array, which it keeps until the call is over."""
-        return ctypes.c_void_p(address(array, self._kind))
-
-
-DOUBLES, LONGS, BYTES = ArrayOf(ctypes.c_double), ArrayOf(ctypes.c_long), ArrayOf(ctypes.c_uint8)
-
-
-def declare(code: ctypes.CDLL, name: str, result: type | None, *arguments: Any) -> None:
-    """Tell ctypes the types of a C function's result and arguments, where the library has it."""
-    if hasattr(code, name):
-        function = getattr(code, name)
-        function.restype, function.argtypes = result, arguments

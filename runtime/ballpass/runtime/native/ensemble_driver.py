@@ -14,19 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.native.c_calls import BYTES, DOUBLES, LONGS, ArrayOf, address, declare, padded
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.driver_library import (
-    BYTES,
-    DOUBLES,
-    LONGS,
-    ArrayOf,
-    address,
-    check_sizes,
-    declare,
-    input_columns,
-    open_driver,
-    padded,
-)
+from ballpass.runtime.native.driver_library import check_sizes, open_driver
 from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, Stepper, method_numbers
@@ -112,7 +102,6 @@ class EnsembleDriver:
         )
         expected = (self.rows.size, len(self.rows.channels))
         check_sizes(library, "numbers of a reduction and channels", (row, channels), expected)
-        self._inputs = input_columns(manifest)
         self.library, self._code = library, code
         self.schedule = MemberSchedule(code, manifest)
         integer, long = ctypes.c_int, ctypes.c_long
@@ -178,7 +167,7 @@ class EnsembleDriver:
         carried.begun = True
         self._code.ballpass_ensemble(
             *(ctypes.byref(options), count, members.p, members.c, tolerance, x, members.first, members.times),
-            *(padded(members.inputs, self._inputs), members.restarts.view(np.uint8)),
+            *(padded(members.inputs), members.restarts.view(np.uint8)),
             *(reductions, carried.work, carried.results),
         )
         return carried.results
@@ -201,7 +190,7 @@ class EnsembleDriver:
         horizons : a turn, or the run, of each member [s]
         """
         found = np.empty_like(initial)
-        moments = padded(inputs, self._inputs)
+        moments = padded(inputs)
         self._code.ballpass_ensemble_magnitudes(
             len(initial), members.p, members.c, initial, first, moments, horizons, found
         )

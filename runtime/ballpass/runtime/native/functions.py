@@ -199,7 +199,6 @@ class CompiledFunctions:
         return compiler
 
     def _external(self, name: str) -> casadi.Function:
-        self._require(name)
         library = self._library(name)
         try:
             return casadi.external(name, str(library.path))

@@ -17,9 +17,10 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.native.c_calls import declare
 from ballpass.runtime.native.compile import compile_sources
 from ballpass.runtime.native.compilers import Compiler
-from ballpass.runtime.native.driver_library import DRIVER, declare
+from ballpass.runtime.native.driver_library import DRIVER
 
 Array = NDArray[np.float64]
 
@@ -54,9 +55,7 @@ class CompiledKernel:
         self.outputs: dict[str, Array] = {}
         self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, Array] | None]] = {}
         for k, name in enumerate(function.name_in()):
-            memory = np.zeros(function.nnz_in(k))
-            if function.size_in(k)[0] * function.size_in(k)[1] != memory.size:
-                raise TypeError(f"{function.name()}: input {name!r} is sparse; a dense one is expected")
+            memory = np.zeros(_dense_rows(function, name, k))
             self.inputs[name] = memory
             if memory.size:
                 self._buffer.set_arg(k, memory.data)
@@ -113,8 +112,7 @@ class Loop:
         self.function = function
         names = function.name_in()
         for k, name in enumerate(function.name_out()):
-            if not function.sparsity_out(k).is_dense():
-                raise TypeError(f"{function.name()}: output {name!r} is sparse; a dense one is expected")
+            _dense_rows(function, name, k, out=True)
         self._varying = [name for name in names if name in varying]
         fixed = [k for k, name in enumerate(names) if name not in varying]
         self._block = CompiledKernel(function.map(function.name(), "serial", BLOCK, fixed, []))
@@ -242,7 +240,8 @@ def _dense_rows(function: casadi.Function, name: str, place: int, *, out: bool =
     """Rows of an argument or result, which the loop takes for a dense column."""
     pattern = function.sparsity_out(place) if out else function.sparsity_in(place)
     if not pattern.is_dense():
-        raise TypeError(f"{function.name()}: {name!r} is sparse; a dense one is expected")
+        what = f"{'output' if out else 'input'} {name!r}"
+        raise TypeError(f"{function.name()}: {what} is sparse; a dense one is expected")
     return int(pattern.nnz())
 
 

@@ -12,7 +12,7 @@ import ctypes
 import numpy as np
 
 from ballpass.runtime.contract.manifest import Manifest
-from ballpass.runtime.native.driver_library import DOUBLES, LONGS, address, declare
+from ballpass.runtime.native.c_calls import DOUBLES, LONGS, address, declare
 
 #: Kinds of inputs in the order of schedule.h.
 KINDS = ("phase", "angle", "rate", "slope", "gate", "table", "table_rate", "border")

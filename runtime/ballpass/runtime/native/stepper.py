@@ -14,17 +14,9 @@ import numpy as np
 
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.method_registry import METHODS
+from ballpass.runtime.native.c_calls import BYTES, DOUBLES, address, declare, padded
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.driver_library import (
-    BYTES,
-    DOUBLES,
-    address,
-    check_sizes,
-    declare,
-    input_columns,
-    open_driver,
-    padded,
-)
+from ballpass.runtime.native.driver_library import check_sizes, open_driver
 
 #: Most steps of a call, accepted and rejected, unless the caller says otherwise: some seconds, during which the
 #: interpreter is deaf to an interrupt.
@@ -207,8 +199,8 @@ class Stepper:
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
         code, sizes = open_driver(library, "ballpass_sizes", 8, (_Options, _Result, _TangentRecord))
-        self._inputs, self._states = input_columns(manifest), len(manifest.states)
-        expected = (len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants))
+        self._states = len(manifest.states)
+        expected = (self._states, max(len(manifest.inputs), 1), len(manifest.parameters), len(manifest.constants))
         check_sizes(library, "states, inputs, parameters and constants", sizes[:4], expected)
         self.lanes, self._work, self.kept = sizes[5:]
         self._code = code
@@ -270,7 +262,7 @@ class Stepper:
             `Outcome.kept` says how many they are.  The first two numbers of each are its end [s] and 1.0 where it lies
             on a kink, else 0.0
         """
-        inputs = padded(segments.inputs, self._inputs)
+        inputs = padded(segments.inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
         keeps = ctypes.c_long(0)
         options = _Options(
@@ -330,7 +322,7 @@ class Stepper:
         inputs : inputs at moments spread over the run, shape (moments, inputs)
         horizon : a turn, or the run [s]
         """
-        moments = padded(inputs, self._inputs)
+        moments = padded(inputs)
         found = np.empty_like(initial)
         self._code.ballpass_magnitudes(p, c, initial, len(moments), moments, horizon, found)
         return found

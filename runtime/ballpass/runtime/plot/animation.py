@@ -13,17 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot import shapes
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import (
-    DrawnForce,
-    coupler_points,
-    drawn_corners,
-    drawn_forces,
-    exaggeration,
-    guide_direction,
-    links,
-    used_points,
-)
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.manifest import MechanismInfo
@@ -155,15 +146,15 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
     mechanism = record.mechanism
     poses = [record.points(float(record.t[k]), record.state(int(k))) for k in samples]
     paths = {key: np.array([pose[key] for pose in poses]) for key in poses[0]}  # (frames, 2) [m]
-    used = used_points(mechanism)
-    corners = drawn_corners(mechanism, paths)
+    used = shapes.used_points(mechanism)
+    corners = shapes.drawn_corners(mechanism, paths)
     low, high = corners.min(axis=0), corners.max(axis=0)
     shown = shown_points(mechanism)
     guides = []
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
             fixed = first == FRAME
-            direction = guide_direction(poses[0], paths, (first, guide), (second, block)) if fixed else None
+            direction = shapes.guide_direction(poses[0], paths, (first, guide), (second, block)) if fixed else None
             guides.append(
                 {
                     "guide": shown.index((first, guide)),
@@ -182,7 +173,8 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
         "high": high.tolist(),
         "points": [_columns(paths[key]) for key in shown],
         "bodies": [
-            {"name": body, "points": [shown.index(key) for key in keys]} for body, keys in links(used, poses[0], size)
+            {"name": body, "points": [shown.index(key) for key in keys]}
+            for body, keys in shapes.links(used, poses[0], size)
         ],
         "pins": [
             {"at": shown.index((second, point)), "fixed": FRAME in (first, second)}
@@ -198,23 +190,23 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
         if mechanism.driver
         else None,
         "masses": [shown.index(key) for key in shown if key[1] == "center_of_mass"],
-        "tracers": [shown.index(key) for key in coupler_points(mechanism)],
+        "tracers": [shown.index(key) for key in shapes.coupler_points(mechanism)],
         "names": [
             *({"at": at, "text": ", ".join(words)} for at, words in names.items()),
-            *({"at": shown.index(key), "text": key[1]} for key in coupler_points(mechanism)),
+            *({"at": shown.index(key), "text": key[1]} for key in shapes.coupler_points(mechanism)),
         ],
-        "forces": [_force(one, shown) for one in drawn_forces(record, samples, paths)],
+        "forces": [_force(one, shown) for one in shapes.drawn_forces(record, samples, paths)],
     }
 
 
 def shown_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
     """Points of a page's linkage, in its order: those that are used, then the centres of mass."""
-    used = used_points(mechanism)
+    used = shapes.used_points(mechanism)
     every = [(info.body, info.point) for info in mechanism.points]
     return [*used, *(key for key in every if key[1] == "center_of_mass" and key not in used)]
 
 
-def _force(one: DrawnForce, shown: list[tuple[str, str]]) -> dict[str, Any]:
+def _force(one: shapes.DrawnForce, shown: list[tuple[str, str]]) -> dict[str, Any]:
     x, y = _columns(one.force)
     return {
         "name": one.name,
@@ -244,7 +236,7 @@ def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
         "pitch": record.parameter("bearing.pitch_diameter"),
         "ball": ball,
         "gap": gap,
-        "factor": exaggeration(0.25 * ball, max(abs(gap), furthest)),
+        "factor": shapes.exaggeration(0.25 * ball, max(abs(gap), furthest)),
         "ball_angle": _signal(_from_first_turn(np.degrees(first)), ANGLE),
         "force": _columns(force[samples]),
         "inner": _columns(1e6 * moved),

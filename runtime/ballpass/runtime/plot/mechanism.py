@@ -14,17 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
+from ballpass.runtime.plot import shapes
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import (
-    Points,
-    coupler_points,
-    drawn_corners,
-    drawn_forces,
-    guide_direction,
-    links,
-    pitch_circles,
-    used_points,
-)
 from ballpass.runtime.plot.style import APPLIED, GREY, INK, SIGNAL, TORQUE, arrow, write
 from ballpass.runtime.report.numbers import rounded
 
@@ -53,7 +44,7 @@ class MechanismView:
     low, high : corners of the box around places and arrows, each (2,) [m]
     """
 
-    trace: Points
+    trace: shapes.Points
     size: float
     greatest: float
     torque: float
@@ -96,8 +87,8 @@ def view(record: Record, samples: Sequence[int]) -> MechanismView:
         if length is None
         else [record.points(float(record.t[samples[0]] + length * k / _TRACE)) for k in range(_TRACE + 1)]
     )
-    trace: Points = {key: np.array([pose[key] for pose in turn]) for key in turn[0]}
-    everything = drawn_corners(record.mechanism, trace)
+    trace: shapes.Points = {key: np.array([pose[key] for pose in turn]) for key in turn[0]}
+    everything = shapes.drawn_corners(record.mechanism, trace)
     size = max(float(np.max(np.ptp(everything, axis=0))), 1e-9)
     forces = [_forces(record, pose, k) for pose, k in zip(poses, samples, strict=True)]
     greatest = max((one.strength for now in forces for one in now), default=0.0)
@@ -136,7 +127,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
     mechanism = record.mechanism
     seen = view(record, [sample]) if seen is None else seen
     now, trace, size = record.points(float(record.t[sample]), record.state(sample)), seen.trace, seen.size
-    used = used_points(mechanism)
+    used = shapes.used_points(mechanism)
     for key in used:
         path = trace[key]
         if float(np.max(np.ptp(path, axis=0))) > 1e-9 * size:
@@ -144,17 +135,17 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
     words = _Words(axes, seen)
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
-            direction = guide_direction(now, trace, (first, guide), (second, block))
+            direction = shapes.guide_direction(now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
             words.avoid(now[second, block] - 0.1 * size * direction, now[second, block] + 0.1 * size * direction, 0.1)
-    for at, radius in pitch_circles(mechanism, now):
+    for at, radius in shapes.pitch_circles(mechanism, now):
         axes.add_patch(Circle(tuple(at), float(radius), fill=False, edgecolor=GREY, linewidth=1.2, zorder=1.5))
     for _, *ends in mechanism.springs:
         one, other = (now[ends[k], ends[k + 1]] for k in (0, 2))
         _draw_spring(axes, one, other, size)
         words.avoid(one, other)
     _draw_links(axes, used, now, size)
-    for _, keys in links(used, now, size):
+    for _, keys in shapes.links(used, now, size):
         for k in range(len(keys)):
             words.avoid(now[keys[k - 1]], now[keys[k]])
     for _, kind, first, point, second, _ in mechanism.joints:
@@ -165,7 +156,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
                 words.avoid(at, at - np.array([0.0, 0.09 * size]))
             look: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.5, "zorder": 6}
             axes.add_patch(Circle(tuple(at), 0.017 * size, **look))
-    for key in coupler_points(mechanism):
+    for key in shapes.coupler_points(mechanism):
         axes.plot(*now[key], marker="o", markersize=4.5, color=INK, zorder=6)
     forces = _seen(_forces(record, now, sample), seen.greatest)
     for one_force in forces:
@@ -235,9 +226,9 @@ class _Words:
         write(self._axes, best, words, fontsize=fontsize, fontweight="bold", color=color, zorder=8)
 
 
-def _draw_links(axes: Axes, used: list[tuple[str, str]], now: Points, size: float) -> None:
+def _draw_links(axes: Axes, used: list[tuple[str, str]], now: shapes.Points, size: float) -> None:
     """Each moving body: a bar between two joints, a plate between more."""
-    for body, keys in links(used, now, size):
+    for body, keys in shapes.links(used, now, size):
         corners = np.array([now[key] for key in keys])
         if len(keys) == 2:
             axes.plot(corners[:, 0], corners[:, 1], color=INK, linewidth=8, solid_capstyle="round", zorder=3)
@@ -302,7 +293,7 @@ def _draw_spring(axes: Axes, one: Array, other: Array, size: float) -> None:
     axes.plot(*np.vstack([one, other]).T, "o", color=GREY, markersize=3.5, zorder=6)
 
 
-def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
+def _put_names(words: _Words, record: Record, now: shapes.Points, size: float) -> None:
     """Names of the joints, those at one place together, and of coupler points."""
     places: list[tuple[Array, list[str]]] = []
     for name, _, _, _, body, point in record.mechanism.joints:
@@ -312,7 +303,7 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
             places.append((at, [name]))
         else:
             shared.append(name)
-    places += [(now[key], [key[1]]) for key in coupler_points(record.mechanism)]
+    places += [(now[key], [key[1]]) for key in shapes.coupler_points(record.mechanism)]
     for at, _ in places:
         words.avoid(at, at, 0.1)
     blocks = [now[item[4], item[5]] for item in record.mechanism.joints if item[1] == "prismatic"]
@@ -321,12 +312,12 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
         words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, places=1, fontsize=10)
 
 
-def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
+def _forces(record: Record, now: shapes.Points, sample: int) -> list[_ForceArrow]:
     """Reactions on the frame, applied forces that act, and those of springs on moving bodies."""
     joints = record.mechanism.joints
     hinges = {item[0]: item[2:4] for item in joints if item[1] == "revolute" and FRAME in (item[2], item[4])}
     found = []
-    for one in drawn_forces(record, np.array([sample]), {key: place[None, :] for key, place in now.items()}):
+    for one in shapes.drawn_forces(record, np.array([sample]), {key: place[None, :] for key, place in now.items()}):
         kind, name, *_ = one.name.split(".")
         if kind != "reaction":
             found.append(_ForceArrow(name=name, at=now[one.at], force=one.force[0], colour=APPLIED, pushes=one.pushes))

@@ -171,16 +171,7 @@ class SteadyState(ShortRepr, Reported):
         return f"; a transient takes {periods:.0f} periods to come as near" if periods > self.integrated else ""
 
     def _report(self) -> Report:
-        from ballpass.runtime.motion.steady_report import (
-            branch_facts,
-            branch_table,
-            branch_words,
-            complex_facts,
-            complex_words,
-            contact_facts,
-            contact_words,
-            grazing_warnings,
-        )
+        from ballpass.runtime.motion import steady_report
 
         rows = [
             {"state": name, "unit": unit, "start": start}
@@ -200,26 +191,26 @@ class SteadyState(ShortRepr, Reported):
         )
         known = [m for m in self.multipliers.tolist() if abs(m) > self.resolution]
         lost = len(self.multipliers) - len(known)
-        listed = ", ".join(complex_words(m) for m in known if m.imag >= 0.0)
+        listed = ", ".join(steady_report.complex_words(m) for m in known if m.imag >= 0.0)
         listed += f"{', ' if known else ''}{lost} below {self.resolution:.0e}" if lost else ""
         parts: list[str | ReportTable] = [
             f"{self.kind[0].upper()}{self.kind[1:]}: in a period a small disturbance {self._grows()}.",
             f"In a period {self.forcing}.",
             table,
             f"Floquet multipliers, a factor of the disturbance a period for each direction: {listed}",
-            contact_words(self.contacts),
+            steady_report.contact_words(self.contacts),
             f"After each of Newton's iterations a period changed the state by "
             f"{', '.join(f'{left:.1e}' for left in self.left)} of its magnitude; {self.integrated} periods integrated, "
             f"in {self.segments} segment{'s' if self.segments > 1 else ''}{self._without_newton()}",
         ]
         if self.sooner < self.repeats:
             parts.append(f"The state is there again after {self.sooner} of {self.repeats} periods already.")
-        if self.over is not None:
-            parts.append(branch_table(self.branches, self.over, self.resolution))
-            parts += [branch_words(branch) for branch in self.branches]
         warnings = [*self.notes]
         if self.over is not None:
-            warnings += [words for branch in self.branches for words in grazing_warnings(branch, self.over)]
+            parts.append(steady_report.branch_table(self.branches, self.over, self.resolution))
+            for branch in self.branches:
+                parts.append(steady_report.branch_words(branch))
+                warnings += steady_report.grazing_warnings(branch, self.over)
         if self.difference > SAME:
             warnings.append(
                 f"{self.turns:g} turns are no period of this machine: at one state the accelerations at both ends "
@@ -229,14 +220,14 @@ class SteadyState(ShortRepr, Reported):
         facts = {
             **self._named("period", "turns", "forcing", "repeats", "sooner"),
             "states": rows,
-            "multipliers": [complex_facts(m) for m in self.multipliers.tolist()],
+            "multipliers": [steady_report.complex_facts(m) for m in self.multipliers.tolist()],
             **self._named("resolution", "stable", "kind"),
-            "contacts": contact_facts(self.contacts),
+            "contacts": steady_report.contact_facts(self.contacts),
             **self._named("left", "segments", "integrated", "difference"),
             "over": self.over.name if self.over else None,
             "over_unit": self.over.unit if self.over else None,
             "units": {} if self.over is None else dict.fromkeys(("value", "between"), self.over.unit),
-            "branches": [branch_facts(branch) for branch in self.branches],
+            "branches": [steady_report.branch_facts(branch) for branch in self.branches],
         }
         return Report(parts=parts, facts=facts, records=rows, index=("state",), warnings=warnings)
 

@@ -13,32 +13,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance, Guide, Mesh
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Motion,
-    Pair,
-    Play,
-    Pose,
-    add,
-    cross,
-    displaced,
-    dot,
-    joint_point,
-    name_joint,
-    name_turn,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
-from ballpass.derive.scene.errors import Fault
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, Play, Pose, displaced, joint_point, name_joint
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript
 from ballpass.derive.variables import Words
 
 
@@ -199,103 +182,6 @@ def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose, p
     return ledger.name_motion(f"joint.{joint.name}.{body}", moved, words, mark)
 
 
-def name_path(
-    ledger: Ledger, mechanism: Mechanism, inner: Joint, guide: Joint, host: Pose, slider: str, point: Pair
-) -> Motion:
-    """Motion of the place on the host where a point of the slider [m] is while both points of the guide coincide.
-
-    `inner` names the joint that is at this point.
-    """
-    rail, shoe = (joint_point(mechanism, guide, body) for body in (host.body, slider))
-    words = f"the path of joint {inner.name} where the points of {guide.name} coincide"
-    path = host.motion(add(rail, subtract(point, shoe)))
-    return ledger.name_motion(f"joint.{guide.name}.base", path, words, f"0,{subscript(guide.name)}")
-
-
-def slid(fellow: Motion, rate: sp.Expr, direction: Pair, speed: sp.Expr, acceleration: sp.Expr) -> Motion:
-    """Motion of a point that slides over a body, whose point there has the motion `fellow`, and which turns."""
-    coriolis = scale(2 * rate * speed, quarter_turn(direction))
-    return Motion(
-        position=fellow.position,
-        velocity=add(fellow.velocity, scale(speed, direction)),
-        acceleration=add(fellow.acceleration, coriolis, scale(acceleration, direction)),
-    )
-
-
-def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:
-    """Point of the outer joint, and vector from it to the inner joint, in body axes [m].
-
-    Raises
-    ------
-    LinkageError
-        both joints sit on one and the same point.
-    """
-    start = joint_point(mechanism, outer, body)
-    span = subtract(joint_point(mechanism, inner, body), start)
-    if span[0].is_zero and span[1].is_zero:
-        raise Fault(
-            key=f"mechanism.bodies.{body}.points",
-            problem=f"joints {outer.name} and {inner.name} sit on the same point of {body}",
-            given=f"points {outer.point(body)} and {inner.point(body)}",
-            allowed="two points at a distance",
-            remedy="give one of them another place",
-        ).of_linkage()
-    return start, span
-
-
-def span_length(ledger: Ledger, body: str, span: Pair) -> sp.Expr:
-    """Length of a span [m], up to its sign, which no formula of this module depends on.
-
-    A span along a body axis is its own length: no square root of a square.
-    """
-    if span[1].is_zero:
-        return span[0]
-    if span[0].is_zero:
-        return span[1]
-    return ledger.define(
-        f"body.{body}.length",
-        sp.sqrt(span[0] ** 2 + span[1] ** 2),
-        "m",
-        f"distance of the two joints of {body}",
-        f"l_{{{subscript(body)}}}",
-    )
-
-
-def name_base(ledger: Ledger, inner: Joint, names: str, ends: Sequence[Motion]) -> tuple[Pair, sp.Expr]:
-    """Name the vector between the outer joints, and its square; `names`: from which joint to which."""
-    prefix, mark = f"joint.{inner.name}", subscript(inner.name)
-    base = ledger.name_pair(
-        f"{prefix}.base",
-        "",
-        subtract(ends[1].position, ends[0].position),
-        "m",
-        f"component of the line {names}",
-        f"d_{{{mark},AXIS}}",
-    )
-    square = ledger.define(
-        f"{prefix}.base_squared", dot(base, base), "m^2", f"square of the distance {names}", f"d_{{{mark}}}^{{2}}"
-    )
-    return base, square
-
-
-def name_span(ledger: Ledger, body: str, vector: Pair) -> Pair:
-    """Name the vector from a body's outer joint to its inner joint, in the frame's axes."""
-    return ledger.name_pair(
-        f"body.{body}.span",
-        "",
-        vector,
-        "m",
-        f"component of the vector between the two joints of {body}",
-        f"u_{{{subscript(body)},AXIS}}",
-    )
-
-
-def turn_by_span(ledger: Ledger, body: str, vector: Pair, span: Pair, length: sp.Expr) -> Pair:
-    """Cosine and sine of the body's angle: `vector` in the plane divided by `span` in body axes."""
-    cos, sin = dot(span, vector) / length**2, cross(span, vector) / length**2
-    return name_turn(ledger, body, cos, sin, subscript(body))
-
-
 def name_rate(ledger: Ledger, body: str, rate: sp.Expr) -> sp.Expr:
     """Name the angular velocity of a body."""
     latex = rf"\dot{{\varphi}}_{{{subscript(body)}}}"
@@ -307,74 +193,3 @@ def name_acceleration(ledger: Ledger, body: str, acceleration: sp.Expr) -> sp.Ex
     latex = rf"\ddot{{\varphi}}_{{{subscript(body)}}}"
     name = f"body.{body}.angular_acceleration"
     return ledger.name(name, acceleration, "rad/s^2", f"angular acceleration of {body}", latex)
-
-
-def guide_axis(guide: Joint) -> Pair:
-    """Unit vector of a guide in the axes of its bodies."""
-    assert guide.direction is not None  # a prismatic joint has a direction
-    angle = symbol_of(guide.direction)
-    return sp.cos(angle), sp.sin(angle)
-
-
-def name_direction(ledger: Ledger, guide: Joint, direction: Pair) -> Pair:
-    """Name the unit vector of a guide in the frame's axes."""
-    return ledger.name_pair(
-        f"joint.{guide.name}.direction",
-        "",
-        direction,
-        "1",
-        f"component of the direction of guide {guide.name}",
-        f"t_{{{subscript(guide.name)},AXIS}}",
-    )
-
-
-def name_travel(
-    ledger: Ledger, guide: Joint, slider: str, order: Literal["", "speed", "acceleration"], value: sp.Expr
-) -> sp.Expr:
-    """Name the travel [m] along a guide or, by `order`, its speed or acceleration."""
-    unit, accent = {"": ("m", "s"), "speed": ("m/s", r"\dot{s}"), "acceleration": ("m/s^2", r"\ddot{s}")}[order]
-    word, latex = order or "travel", f"{accent}_{{{subscript(guide.name)}}}"
-    return ledger.name(f"joint.{guide.name}.{word}", value, unit, f"{word} of {slider} along guide {guide.name}", latex)
-
-
-def name_travels(
-    ledger: Ledger,
-    guides: tuple[tuple[Joint, str, Pair], tuple[Joint, str, Pair]],
-    order: Literal["", "speed", "acceleration"],
-    way: Pair,
-    determinant: sp.Expr,
-) -> tuple[sp.Expr, sp.Expr]:
-    """Name the components of a vector along two guides: joint, slider and direction of each.
-
-    `determinant` is the cross product of both directions.
-    """
-    one, two = guides
-    return (
-        name_travel(ledger, one[0], one[1], order, cross(way, two[2]) / determinant),
-        name_travel(ledger, two[0], two[1], order, cross(one[2], way) / determinant),
-    )
-
-
-def name_crossing(
-    ledger: Ledger, inner: Joint, guides: tuple[Joint, Joint], directions: tuple[Pair, Pair]
-) -> tuple[sp.Expr, Margin]:
-    """Name the sine of the angle from one guide to another [1], which is zero where they are parallel; its margin."""
-    words = f"guide {guides[0].name} to guide {guides[1].name}"
-    latex = rf"\Delta_{{{subscript(inner.name)}}}"
-    sine = ledger.define(
-        f"joint.{inner.name}.determinant", cross(*directions), "1", f"sine of the angle from {words}", latex
-    )
-    words = f"squared sine of the angle between guides {guides[0].name} and {guides[1].name}"
-    return sine, Margin(joint=inner.name, expression=sine**2, description=words)
-
-
-def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> Pair:
-    """Name the right-hand side of the loop closure's derivative."""
-    return ledger.name_pair(
-        f"joint.{inner.name}.closure",
-        order,
-        gap,
-        unit,
-        f"component of the {'velocity' if order == 'v' else 'acceleration'} that closes the loop at {inner.name}",
-        rf"\delta {order}_{{{subscript(inner.name)},AXIS}}",
-    )

@@ -10,32 +10,18 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ballpass.derive.mechanism.balance import Balance, Guide
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Placement,
+from ballpass.derive.mechanism.dyads.closure import name_gap
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Placement
+from ballpass.derive.mechanism.dyads.guides import (
     guide_axis,
     name_crossing,
     name_direction,
-    name_gap,
     name_path,
     name_travels,
     slid,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    add,
-    carried,
-    displaced,
-    dot,
-    joint_point,
-    name_joint,
-    place,
-    quarter_turn,
-    scale,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, displaced, joint_point, name_joint, place
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
 
 

@@ -11,33 +11,20 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ballpass.derive.mechanism.balance import Balance, Guide
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Placement,
+from ballpass.derive.mechanism.dyads.closure import name_gap
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Placement, name_hinge
+from ballpass.derive.mechanism.dyads.guides import (
     guide_axis,
     name_crossing,
     name_direction,
-    name_gap,
-    name_hinge,
     name_path,
     name_travels,
     slid,
 )
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    add,
-    carried,
-    dot,
-    joint_point,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, carried, joint_point, place
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.terms import subscript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,36 +13,13 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance, Guide
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Margin,
-    Placement,
-    guide_axis,
-    name_acceleration,
-    name_base,
-    name_direction,
-    name_gap,
-    name_hinge,
-    name_rate,
-    name_travel,
-)
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    Turn,
-    add,
-    cross,
-    dot,
-    joint_point,
-    name_turn,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.dyads.closure import name_base, name_gap
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin, Placement, name_acceleration, name_hinge, name_rate
+from ballpass.derive.mechanism.dyads.guides import guide_axis, name_direction, name_travel
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, joint_point, name_turn, place
+from ballpass.derive.mechanism.vectors import add, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.terms import subscript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,42 +13,13 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance, Guide
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Margin,
-    Placement,
-    body_span,
-    guide_axis,
-    name_acceleration,
-    name_direction,
-    name_gap,
-    name_hinge,
-    name_path,
-    name_rate,
-    name_span,
-    name_travel,
-    slid,
-    span_length,
-    turn_by_span,
-)
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    Turn,
-    add,
-    carried,
-    cross,
-    dot,
-    joint_point,
-    name_joint,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.dyads.closure import body_span, name_gap, name_span, span_length, turn_by_span
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin, Placement, name_acceleration, name_hinge, name_rate
+from ballpass.derive.mechanism.dyads.guides import guide_axis, name_direction, name_path, name_travel, slid
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, carried, joint_point, name_joint, place
+from ballpass.derive.mechanism.vectors import add, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.terms import subscript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

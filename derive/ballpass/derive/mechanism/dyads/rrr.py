@@ -13,36 +13,12 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Balance
-from ballpass.derive.mechanism.dyads.dyad import (
-    Dyad,
-    Margin,
-    Placement,
-    body_span,
-    name_acceleration,
-    name_base,
-    name_gap,
-    name_hinge,
-    name_rate,
-    name_span,
-    span_length,
-    turn_by_span,
-)
-from ballpass.derive.mechanism.kinematics import (
-    Ledger,
-    Play,
-    Pose,
-    Turn,
-    add,
-    carried,
-    dot,
-    name_joint,
-    place,
-    quarter_turn,
-    scale,
-    subscript,
-    subtract,
-)
+from ballpass.derive.mechanism.dyads.closure import body_span, name_base, name_gap, name_span, span_length, turn_by_span
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin, Placement, name_acceleration, name_hinge, name_rate
+from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, carried, name_joint, place
+from ballpass.derive.mechanism.vectors import add, dot, quarter_turn, scale, subtract
 from ballpass.derive.scene.mechanism_records import Mechanism
+from ballpass.derive.terms import subscript
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,13 +9,14 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
+from ballpass.derive.mechanism.kinematics import body_point
+from ballpass.derive.mechanism.vectors import cross, dot, scale, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript, symbol_of
 from ballpass.derive.variables import Output
 
 

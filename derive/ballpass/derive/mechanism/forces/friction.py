@@ -9,13 +9,12 @@ from typing import ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
-from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill, Needs
 from ballpass.derive.scene.mechanism_records import Driver, Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, keys_of, not_negative, positive, read_record
 from ballpass.derive.scene.table import Table
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript, symbol_of
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract.manifest import UsualInfo
 

@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
+from ballpass.derive.mechanism.kinematics import joint_point
+from ballpass.derive.mechanism.vectors import dot, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.mechanism_records import Force, Joint

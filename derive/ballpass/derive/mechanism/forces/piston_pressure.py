@@ -10,7 +10,7 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Law, Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
-from ballpass.derive.mechanism.kinematics import Pair
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.read_keys import not_negative, positive, quantity

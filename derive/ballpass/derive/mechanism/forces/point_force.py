@@ -9,7 +9,8 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import Pair, body_point, scale
+from ballpass.derive.mechanism.kinematics import body_point
+from ballpass.derive.mechanism.vectors import Pair, scale
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.mechanism_records import Force

@@ -8,12 +8,11 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
-from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Needs
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, not_negative, quantity
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import subscript, symbol_of
 from ballpass.derive.variables import Output
 
 _STIFF = (Needs(key="stiffness", why="it belongs to a stiffness"),)

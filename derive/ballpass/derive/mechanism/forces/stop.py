@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
-from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import not_negative, quantity
-from ballpass.derive.terms import Smoothness, symbol_of
+from ballpass.derive.terms import Smoothness, subscript, symbol_of
 from ballpass.derive.variables import Input, Output, StateSwitch
 
 

@@ -10,12 +10,12 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import Pair, cross, dot, rotate, subscript
 from ballpass.derive.mechanism.swing import Average, followed, nearest
+from ballpass.derive.mechanism.vectors import Pair, cross, dot, rotate
 from ballpass.derive.scene.body_keys import BODIES
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import defined, symbol_of
+from ballpass.derive.terms import defined, subscript, symbol_of
 from ballpass.runtime.contract.manifest import UsualInfo
 
 

@@ -9,11 +9,13 @@ import sympy as sp
 
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
-from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
+from ballpass.derive.mechanism.kinematics import body_point
+from ballpass.derive.mechanism.vectors import dot, scale, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Force, Mechanism
 from ballpass.derive.scene.table import FRAME
+from ballpass.derive.terms import subscript
 from ballpass.derive.variables import Output
 
 

@@ -10,7 +10,8 @@ from typing import Annotated
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words
+from ballpass.runtime.app.commands.messages import show, size_words
+from ballpass.runtime.app.commands.shared import command, load_model, results_file
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
 from ballpass.runtime.plot import MOVING

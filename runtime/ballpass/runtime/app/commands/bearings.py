@@ -8,7 +8,8 @@ from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import command, show_json, show_parts
+from ballpass.runtime.app.commands.messages import show_json, show_parts
+from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.ratings import tolerances

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import Stages, check_folder, command, complain, show, show_json, warn
+from ballpass.runtime.app.commands.messages import complain, show, show_json, warn
+from ballpass.runtime.app.commands.shared import Stages, check_folder, command
 from ballpass.runtime.contract.options import Option
 from ballpass.runtime.report.units import with_units
 

@@ -18,19 +18,8 @@ from typer.core import TyperArgument, TyperCommand
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
-from ballpass.runtime.app.commands.shared import (
-    Stages,
-    can_draw,
-    check_folder,
-    command,
-    complain,
-    load_model,
-    name_of,
-    note,
-    show_files,
-    show_json,
-    warn,
-)
+from ballpass.runtime.app.commands.messages import complain, note, show_files, show_json, warn
+from ballpass.runtime.app.commands.shared import Stages, can_draw, check_folder, command, load_model, name_of
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import command, complain, warn_of_scene
+from ballpass.runtime.app.commands.messages import complain, warn_of_scene
+from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.options import Option
 

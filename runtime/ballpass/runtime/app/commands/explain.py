@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import asked_of, read_with_settings
-from ballpass.runtime.app.commands.shared import command, load_model, show_json
+from ballpass.runtime.app.commands.messages import show_json
+from ballpass.runtime.app.commands.shared import command, load_model
 from ballpass.runtime.ratings.elements import element_words
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report

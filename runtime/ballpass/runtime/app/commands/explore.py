@@ -13,7 +13,8 @@ from typing import Any
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, results_file, show, size_words, speed_over_time
+from ballpass.runtime.app.commands.messages import show, size_words
+from ballpass.runtime.app.commands.shared import command, load_model, results_file, speed_over_time
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.units import QuantityError, parse_quantity
 

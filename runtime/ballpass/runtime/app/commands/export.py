@@ -17,15 +17,8 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import generated_folder, read_asked
-from ballpass.runtime.app.commands.shared import (
-    check_folder,
-    command,
-    name_of,
-    note,
-    read_own,
-    speed_over_time,
-    warn_of_scene,
-)
+from ballpass.runtime.app.commands.messages import note, warn_of_scene
+from ballpass.runtime.app.commands.shared import check_folder, command, name_of, read_own, speed_over_time
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.folder import read_artefact

@@ -6,7 +6,8 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-from ballpass.runtime.app.commands.shared import command, note, show
+from ballpass.runtime.app.commands.messages import note, show
+from ballpass.runtime.app.commands.shared import command
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.options import Option

@@ -10,31 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
-from ballpass.runtime.app.commands.shared import (
-    Stages,
-    can_draw,
-    command,
-    load_model,
-    note,
-    results_folder,
-    show_files,
-    show_json,
-    show_parts,
-    size_words,
-    warn,
-)
+from ballpass.runtime.app.commands.messages import note, show_files, show_json, show_parts, size_words, warn
+from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import CHOICE, OWN, STEPPERS
-from ballpass.runtime.contract.options import (
-    Cycles,
-    Duration,
-    Option,
-    Rtol,
-    SampleRate,
-    options_in,
-    refuse_unknown,
-)
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate, options_in, refuse_unknown
 from ballpass.runtime.contract.refused_scenes import refuse_still, refuse_without_bearings
 from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions import option_names

@@ -1,4 +1,4 @@
-"""Functions that the commands of ``ballpass`` share: errors as messages, stages on stderr, folders, loading a model.
+"""Functions that the commands of ``ballpass`` share: errors with exit codes, stages on stderr, folders, a model.
 
 Like every module here it serves both halves and imports `ballpass.derive` inside functions.  Messages and
 progress go to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130
@@ -8,11 +8,9 @@ interrupted.
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import sys
 import tempfile
-import textwrap
 import threading
 import time
 import warnings
@@ -21,29 +19,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ballpass.runtime.app.commands.load_scene import generated_folder
+from ballpass.runtime.app.commands.messages import complain, errors_console, note, warn
 from ballpass.runtime.app.interrupted import say_interrupted
-from ballpass.runtime.contract.errors import BallpassError, RequestError, printable
+from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.contract.folder import ForeignFolderError, read_manifest
 from ballpass.runtime.contract.folders import nearest
 from ballpass.runtime.contract.plugins import place_of
-from ballpass.runtime.report.plain import json_text
-from ballpass.runtime.report.report import Report, ReportTable, Words
-from ballpass.runtime.report.text import WIDTH
-from ballpass.runtime.report.text import show as show_report
 from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
     from ballpass.runtime.app.commands.load_scene import Asked
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
-
-errors_console = Console(stderr=True, emoji=False)  # A:B:N is not an emoji
 
 #: Times that a folder is derived and read while another process writes its own scene there.
 ATTEMPTS = 100
@@ -117,60 +108,6 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
             raise
         complain(f"{place}, a plugin: {type(fault).__name__}: {fault}. Correct it; ballpass.testing has checks.")
         raise typer.Exit(2) from fault
-
-
-def warn_of_scene(manifest: Manifest) -> None:
-    """Warn of a scene's unusual numbers, for commands that compute nothing."""
-    from ballpass.runtime.contract.plausible_ranges import warn_unusual
-
-    warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
-
-
-def complain(message: str) -> None:
-    """Print an error on stderr."""
-    _say("[bold red]error[/]", message)
-
-
-def warn(message: Warning | str) -> None:
-    """Print a warning on stderr."""
-    _say("[bold yellow]warning[/]", str(message))
-
-
-def note(message: str) -> None:
-    """Print a remark on stderr."""
-    _say("[bold]note[/]", message)
-
-
-def _say(kind: str, message: str) -> None:
-    """Print on stderr: on a terminal in lines broken between words, elsewhere a sentence is a line."""
-    marked = f"{kind}: {escape(printable(message))}"
-    errors_console.print(marked, soft_wrap=not errors_console.is_terminal, highlight=False)
-
-
-def show(text: str) -> None:
-    """Print a line of results on stdout."""
-    Console(emoji=False).print(printable(text), highlight=False, soft_wrap=True, markup=False)
-
-
-def show_files(folder: Path, files: Sequence[str], more: str = "") -> None:
-    """Print the names of the files that were written, in lines of 80 columns at most where names allow it."""
-    words = f"results in {folder}: {', '.join(files)}{more}"
-    show(textwrap.fill(words, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
-
-
-def show_json(result: Any) -> None:
-    """Print results as one JSON object on stdout."""
-    typer.echo(json_text(result), nl=False)
-
-
-def show_parts(*parts: Words | ReportTable) -> None:
-    """Print tables and sentences on stdout."""
-    show_report(Report(parts=parts))
-
-
-def size_words(count: int) -> str:
-    """Bytes for people."""
-    return f"{count / 1e6:.0f} MB" if count >= 1e6 else f"{math.ceil(count / 1e3)} kB"
 
 
 class Stages:

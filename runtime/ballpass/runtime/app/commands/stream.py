@@ -9,7 +9,8 @@ from typing import Annotated
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import read_asked
-from ballpass.runtime.app.commands.shared import command, load_model, show
+from ballpass.runtime.app.commands.messages import show
+from ballpass.runtime.app.commands.shared import command, load_model
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, options_in, refuse_unknown
 from ballpass.runtime.questions import option_names
 

@@ -15,19 +15,8 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.load_scene import asked_of, read_asked, read_formats, read_with_settings
-from ballpass.runtime.app.commands.shared import (
-    can_draw,
-    command,
-    complain,
-    load_model,
-    note,
-    results_folder,
-    show,
-    show_files,
-    show_json,
-    show_parts,
-    warn,
-)
+from ballpass.runtime.app.commands.messages import complain, note, show, show_files, show_json, show_parts, warn
+from ballpass.runtime.app.commands.shared import can_draw, command, load_model, results_folder
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import read_manifest
