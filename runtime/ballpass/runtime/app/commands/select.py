@@ -225,7 +225,7 @@ def select(
     )
 
 
-def _refuse_without_life(why: str, *_: str) -> None:
+def _refuse_without_life(why: str) -> None:
     if why:
         raise RequestError(f"{why.partition(':')[0]}. Allowed: a bearing that turns, or static safety without --life.")
 
@@ -239,7 +239,7 @@ def _judged(candidate: Candidate, report: LifeReport, name: str, life: float | N
     states = [one for state in report.states for one in state.bearings if one.name == name]
     why = [one.why_no_life for one in states if one.why_no_life]
     if not states or (life is not None and len(why) == len(states)):  # of the motion, so with each bearing
-        _refuse_without_life(*why[:1], "Nothing turns in any state")
+        _refuse_without_life(why[0] if why else "Nothing turns in any state")
     reached = states[0].reached
     lives = [one.modified_hours or one.hours for one in report.duty if one.name == name]
     (hours,) = lives or [None if reached is None else states[0].hours(reached)]
