@@ -102,7 +102,7 @@ def test_every_command_is_a_tool_and_every_tool_with_json_is_asked_here() -> Non
     assert set(ASKED) == with_json
 
 
-@pytest.mark.parametrize("name", long_but(sorted(ASKED), "bearings", "life", "linearize", "sensitivity"))
+@pytest.mark.parametrize("name", long_but(sorted(ASKED), "bearings", "life"))
 def test_a_tool_gives_the_json_of_its_command_with_the_unit_of_every_number(
     name: str, place: Path, make_model: Callable[..., Model], request: pytest.FixtureRequest
 ) -> None:

@@ -99,6 +99,7 @@ def highest(done: subprocess.CompletedProcess[str]) -> float:
 RUN = ("run", "press.toml", "--no-figures", "--json", "--cycles", "0.3", "--transient", "0", "--of", "max:ball.force")
 
 
+@pytest.mark.long
 def test_a_law_runs_is_derived_anew_where_it_changes_and_runs_where_it_is_missing(place: Path, command: Run) -> None:
     first = highest(command(*RUN))
     install(place / "site", LAW.replace("rate**3", "9 * rate**3"))
@@ -244,6 +245,7 @@ def test_the_kit_passes_the_page_s_law(law_of: Callable[..., str]) -> None:
     check_damping_law("cubic", NUMBERS, plugins=[law_of("right_law")])
 
 
+@pytest.mark.long
 def test_the_law_of_two_numbers_on_the_page_is_hunt_crossley_s_with_its_factor(written: Callable[..., str]) -> None:
     """8 (1 - 0.8) / (5 · 0.8 · 0.1 m/s) = 4 s/m."""
     numbers = 'restitution = 0.8\nimpact_speed = "0.1 m/s"'
@@ -268,7 +270,13 @@ def test_the_law_of_two_numbers_on_the_page_is_hunt_crossley_s_with_its_factor(w
         pytest.param(
             "not_zero", "rate**3", "(rate**3 + coefficient / coefficient)", "not zero at rest", marks=pytest.mark.long
         ),
-        ("wrong_slope", "rate**3", "rate**3 * (1 + sp.sin(rate * 1e14) / 2)", "its slope by the rate"),
+        pytest.param(
+            "wrong_slope",
+            "rate**3",
+            "rate**3 * (1 + sp.sin(rate * 1e14) / 2)",
+            "its slope by the rate",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_the_kit_catches_a_wrong_law(law_of: Callable[..., str], name: str, old: str, new: str, words: str) -> None:

@@ -77,6 +77,7 @@ def test_rings_of_unlike_speeds_have_a_life(both: Model) -> None:
     assert bearing.hours(bearing.life) == pytest.approx(hours, rel=1e-6)
 
 
+@pytest.mark.long
 def test_an_outer_ring_that_does_not_turn_is_none(model_of: Callable[..., Model]) -> None:
     standing = model_of(SCENE.replace('"-700 rpm"', '"0 rpm"'), "standing")
     without = model_of(SCENE.replace('outer_speed = "-700 rpm"\n', ""), "without")

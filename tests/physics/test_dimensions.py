@@ -46,6 +46,7 @@ def test_derivatives_by_all_parameters_add_up_as_units_ask(make_model: Callable[
     assert timed <= {"kg", "m"}
 
 
+@pytest.mark.long
 def test_a_derivative_that_is_off_by_a_hundredth_is_seen(make_model: Callable[..., Model]) -> None:
     model = make_model("varying_compliance")
     report = model.sensitivity("rms:inner.y")

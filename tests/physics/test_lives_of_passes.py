@@ -93,6 +93,7 @@ def test_lives_of_random_tables_are_sums_over_passes(press: Model) -> None:
         assert abs(found.speed) == pytest.approx(expected["speed"], rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_driver_that_starts_at_rest_has_a_life(press: Model) -> None:
     """Rows of 0 rpm are legal, and no ball passes there: the first one was taken for a bearing that does not turn."""
     rpm = np.array([0.0, 500.0, 500.0, 600.0, 600.0, 0.0])

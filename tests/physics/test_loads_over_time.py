@@ -75,6 +75,7 @@ def test_turns_of_a_scene_without_a_run_say_that_they_lie_behind_the_table(
     assert warnings_of_transient(bare, earlier, cycles=60, transient=5) == warnings_of_transient(worked, {}) == []
 
 
+@pytest.mark.long
 def test_turns_behind_the_last_row_are_alike(worked: Model) -> None:
     """There the machine is the one whose load has the value of the last row all along."""
     behind = math.ceil(LENGTH / worked.period()) + 10

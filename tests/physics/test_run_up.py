@@ -249,6 +249,7 @@ def test_angles_and_orders_of_a_run_up_are_those_of_the_integral_of_its_table(wi
         assert found[name].value == pytest.approx(found[given].value, rel=1e-9), name
 
 
+@pytest.mark.long
 def test_derivatives_of_a_run_up_agree_with_runs_beside_it(with_bearing: Model) -> None:
     """By speeds and times of rows: at an angle, at an order, of an extreme of the torque."""
     asked = ["value:drive_torque@240deg", "amplitude:inner.y@1x", "amplitude:inner.y@bpfo", "max:drive_torque"]

@@ -116,6 +116,7 @@ def test_a_torsion_spring_of_a_body_that_swings_does_not_jump(make_model: Callab
         assert found == pytest.approx(3.0 + 30.0 * excess + 0.5 * closed.angle_rate, rel=1e-11, abs=1e-11)
 
 
+@pytest.mark.long
 def test_a_torsion_spring_between_bodies_that_turn_warns_in_every_question(make_model: Callable[..., Model]) -> None:
     """Its torque jumps by stiffness times a turn, once a turn."""
     outputs = (OUTPUTS[0], OUTPUTS[1].replace('"spring.*", ', ""))

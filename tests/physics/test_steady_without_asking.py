@@ -91,6 +91,7 @@ def test_rings_at_rest_do_not_fall_through_their_clearance(plain: Model, tmp_pat
     assert transient.parameters["bearing.initial.inner.y"] == 0.0
 
 
+@pytest.mark.long
 def test_the_file_of_a_run_without_stated_turns_has_the_steady_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,6 +122,7 @@ def test_settling_drops_the_start(plain: Model) -> None:
     assert found.reductions["ball.force"].maximum == pytest.approx(steady, rel=1e-3)
 
 
+@pytest.mark.long
 def test_run_warns_of_an_extreme_in_its_first_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "falling.toml").write_text(FOUR + CONCENTRIC + RUN, encoding="utf-8")

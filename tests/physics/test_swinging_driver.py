@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_cases import long_but
 from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, derive
@@ -220,7 +221,7 @@ free_angle = "-120 deg"
 """
 
 
-@pytest.mark.parametrize("amplitude", [100.0, 150.0, 400.0])
+@pytest.mark.parametrize("amplitude", long_but([100.0, 150.0, 400.0], "400.0"))
 def test_spring_and_balls_of_a_pendulum_follow_it_over_any_angle(
     model_of: Callable[..., Model], amplitude: float
 ) -> None:
@@ -268,6 +269,7 @@ def test_springs_of_a_crank_rocker_follow_its_bodies_over_any_angle(
         np.testing.assert_allclose(run[f"torsion_spring.{body}.torque"], excess, atol=1e-10)
 
 
+@pytest.mark.long
 def test_a_spring_in_a_linkage_that_cannot_turn_round_follows_its_bodies(model_of: Callable[..., Model]) -> None:
     """With a table to and fro within the driver's range; the equations of the same machine whose driver swings."""
     springs = """[mechanism.torsion_springs.at_rocker]
@@ -301,6 +303,7 @@ free_angle = "-130 deg"
     np.testing.assert_allclose(run["torsion_stop.at_coupler.compression"], clear, atol=1e-12)
 
 
+@pytest.mark.long
 def test_balls_in_a_linkage_that_cannot_turn_round_roll_with_its_bodies(model_of: Callable[..., Model]) -> None:
     """In the hinge of the rocker: the cage turns by its share of the rocker's angle."""
     text = ROCKERS.replace("[run]", BEARING.replace('joint = "A"', 'joint = "D"')).replace(

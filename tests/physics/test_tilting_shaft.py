@@ -82,6 +82,7 @@ def test_unbalance_bows_by_its_mass_and_a_couple_tilts(rotor: Model) -> None:
         assert complex(values["shaft.tilt.y"], -values["shaft.tilt.x"]) == pytest.approx(slope * turned, rel=1e-9)
 
 
+@pytest.mark.long
 def test_motion_obeys_newton_and_euler_in_any_state(model_of: Callable[..., Model]) -> None:
     """Of the centre of mass and of the tilts: forces of the balls and loads at their places, moments of a gyroscope."""
     model = model_of(
@@ -119,6 +120,7 @@ def test_motion_obeys_newton_and_euler_in_any_state(model_of: Callable[..., Mode
         assert TRANSVERSE * bent == pytest.approx(moment + turning, rel=1e-11, abs=1e-11 * np.abs(moment).max())
 
 
+@pytest.mark.long
 def test_three_supports_carry_by_their_stiffness(model_of: Callable[..., Model]) -> None:
     """A rigid beam on three springs alike at -b, 0, b: F/3 + F z z_i/(2 b^2); the middle one off the line by e carries
     2 k e/3, and each of the others k e/3 against it."""

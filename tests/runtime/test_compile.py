@@ -213,6 +213,7 @@ def test_without_compiler_the_virtual_machine_gives_the_same_results_and_a_warni
         assert b.statistics.steps > 0
 
 
+@pytest.mark.long
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
 def test_ziglang_compiles_where_the_system_has_no_compiler(
     cache: Path, source: Path, monkeypatch: pytest.MonkeyPatch

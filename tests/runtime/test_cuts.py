@@ -169,7 +169,7 @@ def derivative_of_root(
     return (roots[1] - roots[0]) / (2.0 * step)
 
 
-@pytest.mark.parametrize("by", [f"{DRIVER}flywheel.inertia", f"{PUNCH}end"])
+@pytest.mark.parametrize("by", [pytest.param(f"{DRIVER}flywheel.inertia", marks=pytest.mark.long), f"{PUNCH}end"])
 def test_windows_and_jumps_of_an_angle_move_as_the_motion_does(make_model: Callable[..., Model], by: str) -> None:
     """Of a press that a motor turns: both edges of the window, and the angle's jump, in its second turn."""
     model = make_model("punching_press_motor", ('outputs = ["inner.*",', 'outputs = ["body.crank.angle", "inner.*",'))

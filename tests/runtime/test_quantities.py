@@ -252,6 +252,7 @@ def test_the_shaft_of_a_bearing_that_swings_is_the_driver(make_model: Callable[.
             values(model, [f"amplitude:pin.inner.x@{what}"], cycles=2, transient=1)
 
 
+@pytest.mark.long
 def test_the_frequency_of_a_cage_between_rings_moves_with_the_balls_whichever_ring_turns(
     make_model: Callable[..., Model],
 ) -> None:
@@ -261,6 +262,7 @@ def test_the_frequency_of_a_cage_between_rings_moves_with_the_balls_whichever_ri
     assert [pair.check.verdict for pair in report.pairs] == [Verdict.VERIFIED]
 
 
+@pytest.mark.long
 def test_the_frequency_of_a_cage_whose_slip_changes_is_that_of_its_mean_over_the_run(
     make_model: Callable[..., Model],
 ) -> None:

@@ -44,6 +44,7 @@ def test_a_candidate_is_the_scene_with_its_bearing(tmp_path: Path, monkeypatch: 
         assert (("life:" in row["lacks"]), ("s_0:" in row["lacks"])) == (short, weak)
 
 
+@pytest.mark.long
 def test_axial_force_and_states_at_rest_count(tmp_path: Path) -> None:
     """The life with the axial force, over a cycle in which the rotor rests for half of the time."""
     text = (SCENES / "rotor.toml").read_text(encoding="utf-8")
@@ -77,6 +78,7 @@ def test_what_no_table_has_is_refused(words: tuple[str, str], allowed: str) -> N
     assert allowed in " ".join(done.stderr.split())
 
 
+@pytest.mark.long
 def test_a_life_is_refused_at_the_first_bearing_where_nothing_turns(tmp_path: Path) -> None:
     """All bearings of the tables were run before it said so.  Static safety is found without a life."""
     text = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")

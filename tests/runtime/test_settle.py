@@ -64,6 +64,7 @@ def test_what_does_not_settle_says_so(press: Model) -> None:
         press.settle(parameters={"mechanism.driver.speed": 0.0}, transient=0)
 
 
+@pytest.mark.long
 def test_run_says_what_more_turns_change_and_settles_on_request(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -93,6 +93,7 @@ def test_wilson_covers_the_share_in_95_percent_of_samples() -> None:
     assert wilson(0, 10)[1] == pytest.approx(0.2775, abs=1e-4)  # a printed table
 
 
+@pytest.mark.long
 def test_shares_of_the_few_members_that_have_results_are_a_fault(rotor: Model) -> None:
     """Above some 100 kN a ball is flattened as in no bearing."""
     load, of = "load.force.x=1 kN:100 MN", "rms:inner.y"
