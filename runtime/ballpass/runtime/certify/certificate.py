@@ -283,7 +283,7 @@ def by_differences(
             for place in left:
                 k, mine = moves[place][0], asked[place]
                 width = (upper - lower)[place, : some.stop]
-                found = extrapolated(*table[:, place, : some.stop], width, noise)
+                found = extrapolated(table[0, place, : some.stop], table[1, place, : some.stop], width, noise)
                 # triangles that exclude each other know no more than their distance
                 apart = np.nan_to_num(np.abs(found.value - value[:, k]))
                 apart = np.where(apart > found.error + error[:, k], apart, 0.0)
@@ -292,7 +292,7 @@ def by_differences(
                 sides = _sides(quantities, table[:, place, : some.stop], 0.5 * width)
                 allowed = agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / width[-1]
                 kinked = np.abs(sides[1] - sides[0]) > KINK * allowed
-                if some.stop < HALVINGS:
+                if expected is not None and some.stop < HALVINGS:
                     enough = KNOWN * (agreement * np.abs(found.value) + quantum[:, k])
                     mine = mine & ~kinked & (fresh <= enough) & (np.abs(found.value - expected[:, k]) <= enough)
                     asked[place] = asked[place] & ~mine
