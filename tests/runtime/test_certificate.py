@@ -128,8 +128,28 @@ def test_slopes_on_both_sides_of_a_kink_are_given() -> None:
     assert "2 below the parameter's value and 4 above" in check.reason
 
 
-def test_what_is_found_of_a_pair_does_not_depend_on_the_others() -> None:
+def test_two_steps_are_enough_where_they_agree_with_the_derivative() -> None:
+    """exp(a) b: a third step to each side where the derivative is another one."""
+    at, slopes = {"a": 1.0, "b": 2.0}, np.array([[2.0 * math.e, math.e]])
+    taken: list[int] = []
+
+    def measure(changes: Sequence[Mapping[str, float]]) -> np.ndarray:
+        taken.append(len(changes))
+        return np.array([[math.exp(change.get("a", 1.0)) * change.get("b", 2.0)] for change in changes])
+
+    for expected, runs in ((slopes, [5, 8]), (slopes * [1.0, 1.01], [5, 8, 2])):
+        taken.clear()
+        scales, quantum = np.array([1.0, 2.0]), np.full((1, 2), 1e-5)
+        found = by_differences(measure, at, scales, quantum=quantum, jitter=jitter(at), expected=expected)
+        assert taken == runs
+        assert np.all(np.abs(found.value - slopes) <= found.uncertainty)
+        assert np.all(found.uncertainty < 1e-4 * slopes)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_what_is_found_of_a_pair_does_not_depend_on_the_others(known: bool) -> None:
     """A smooth, a noisy, a sharply bent and a kinked function by two parameters, alone and together."""
+    slopes = np.array([[2.0 * math.e, math.e], [2.0, 1.0], [3e3 * math.cos(3e3), 1.0], [1.0, 4.0]])
     functions: tuple[Callable[[float, float], float], ...] = (
         lambda a, b: math.exp(a) * b,
         lambda a, b: a * b + 1e-7 * math.sin(1e9 * (a + b)),
@@ -145,7 +165,9 @@ def test_what_is_found_of_a_pair_does_not_depend_on_the_others() -> None:
 
         given = {name: at[name] for name in names}
         quantum = np.full((len(chosen), len(names)), 1e-5)
-        return by_differences(measure, given, np.array(list(given.values())), quantum=quantum, jitter=moves)
+        expected = slopes[np.ix_(chosen, ["ab".index(name) for name in names])] if known else None
+        scales = np.array(list(given.values()))
+        return by_differences(measure, given, scales, quantum=quantum, jitter=moves, expected=expected)
 
     together = found(range(4), "ab")
     for row in range(4):

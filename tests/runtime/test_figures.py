@@ -407,6 +407,18 @@ def test_phase_portrait_marks_the_state_at_each_turn(press: Run) -> None:
     assert points == pytest.approx(expected, abs=1e-6)
 
 
+def test_displacements_are_those_of_both_rings_over_two_turns(press: Run) -> None:
+    figure = draw("displacements", *press)
+    solution = press[1].steady()
+    angle = np.degrees(solution.parameters["mechanism.driver.speed"] * solution.t)
+    for axes, axis in zip(figure.axes, "xy", strict=True):
+        for ring, line in zip(("inner", "outer"), axes.get_lines(), strict=True):
+            shown = line.get_xydata()
+            assert np.ptp(shown[:, 0]) == pytest.approx(720.0)
+            assert np.mod(shown[:, 0] - angle[-len(shown) :] + 1.0, 360.0) == pytest.approx(1.0, abs=1e-6)
+            assert shown[:, 1].tolist() == (1e6 * solution[f"{ring}.{axis}"][-len(shown) :]).tolist()
+
+
 def test_every_ball_has_its_strip(press: Run) -> None:
     figure = draw("ball_loads", *press)
     solution = press[1].steady()
@@ -772,7 +784,7 @@ def test_figures_leave_pyplot_alone() -> None:
 
 
 def test_unknown_figure_is_refused_with_the_names_there_are(press: Run) -> None:
-    with pytest.raises(RequestError, match="load_curve, orbit, spectra"):
+    with pytest.raises(RequestError, match="load_curve, orbit, displacements, spectra"):
         draw("waterfall", *press)
 
 

@@ -41,7 +41,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     numbers = model.numbers()
     turn = timeline.stretch(model.manifest, numbers.values)
     state = np.array([numbers.values[name] for name in model.manifest.initial])
-    tolerance = 1e-6 * stepper_magnitudes(model, model.ensemble_driver.stepper, numbers, state, 2.0 * turn, turn)
+    tolerance = 1e-6 * stepper_magnitudes(model, model.stepper, numbers, state, 2.0 * turn, turn)
     segments = make_segments(model.manifest, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))
     layout = model.ensemble_driver.rows
     row = layout.empty(1, turn, layout.all_of(channel_names(model.manifest)))[0]
@@ -80,7 +80,7 @@ def test_a_run_has_the_same_bits_however_it_is_cut_into_calls(
 ) -> None:
     """End, reductions, samples, and all that the driver counts; cut within segments, at refused steps, at kinks."""
     model = press(make_model, law)
-    stepper = model.locating_stepper if kinks == "located" else model.ensemble_driver.stepper
+    stepper = model.locating_stepper if kinks == "located" else model.stepper
     whole, expected, once = in_calls(model, stepper, method, 10**9)
     assert (whole.end, once) == (End.DONE, 1)
     assert whole.kinks > 20 if kinks == "located" else whole.kinks == 0

@@ -18,7 +18,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.certify.differences import extrapolated
+from ballpass.runtime.certify.differences import FEWEST, extrapolated
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,9 @@ FIRST_STEP, LARGER, SMALLER = 1e-3, 10.0, 0.1
 
 #: Most triangles of a parameter, and steps of each.
 TRIANGLES, HALVINGS = 3, 3
+
+#: Part of the disagreement that is allowed, within which a number is known well enough [1].
+KNOWN = 0.3
 
 #: Slopes on both sides of a parameter's value that differ by so many times what is allowed are those of a kink.
 KINK = 5.0
@@ -232,6 +235,7 @@ def by_differences(
     quantum: Array,
     jitter: Sequence[Mapping[str, float]],
     agreement: float = AGREEMENT,
+    expected: Array | None = None,
 ) -> Second:
     """Derivatives of quantities by Richardson-extrapolated central differences, with step control.
 
@@ -246,6 +250,8 @@ def by_differences(
     jitter : tiny changes, evenly spaced and the middle one none, that show the noise of a run: what step sizes that are
         chosen anew do to its values
     agreement : relative disagreement that will be allowed [1]
+    expected : derivatives that the differences will be compared with, same shape: where those of two steps agree with
+        them and with each other, a third step is not taken
     """
     names, centre = list(at), np.array(list(at.values()))
     jittered = measure(jitter)
@@ -257,42 +263,50 @@ def by_differences(
     for tried in range(1, TRIANGLES + 1):
         # each parameter is moved by the steps that any of its quantities asks for
         moves = [(k, size) for k in range(len(names)) for size in np.unique(step[wanting[:, k], k]).tolist()]
-        if not moves:
-            break
-        reach = np.array([size * scales[k] * halves for k, size in moves])
+        reach = np.array([size * scales[k] * halves for k, size in moves]).reshape(-1, HALVINGS)
         places = centre[[k for k, _ in moves], None]
         upper, lower = places + reach, places - reach
-        changes = [
-            {names[k]: moved}
-            for side in (upper, lower)
-            for (k, _), row in zip(moves, side.tolist(), strict=True)
-            for moved in row
-        ]
-        table = measure(changes).reshape(2, len(moves), HALVINGS, len(noise))
-        asked = wanting.copy()
-        for place, (k, size) in enumerate(moves):
-            mine = asked[:, k] & (step[:, k] == size)
-            width = (upper - lower)[place]
-            triangle = extrapolated(table[0, place], table[1, place], width, noise)
-            # triangles that exclude each other know no more than their distance
-            apart = np.nan_to_num(np.abs(triangle.value - value[:, k]))
-            apart = np.where(apart > triangle.error + error[:, k], apart, 0.0)
-            fresh = np.maximum(triangle.error, apart)
-            known = np.maximum(error[:, k], apart)
-            better = mine & (fresh < known)
-            sides = _sides(quantities, table[:, place], 0.5 * width)
-            allowed = agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / width[-1]
-            kinked = np.abs(sides[1] - sides[0]) > KINK * allowed
-            below[better, k] = np.where(kinked, sides[0], np.nan)[better]
-            above[better, k] = np.where(kinked, sides[1], np.nan)[better]
-            value[better, k] = triangle.value[better]
-            error[mine, k] = np.where(better, fresh, known)[mine]
-            wanting[mine, k] = (error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k]))[mine]
-            # noise over the width of the smallest difference, twice as `extrapolated` counts it
-            noisy = 2.0 * noise / width[-1] > 0.2 * error[:, k]
-            larger = noisy & (tried == 1)
-            factor = np.where(larger, LARGER, SMALLER ** (tried - noisy.astype(float)))
-            step[mine, k] = (FIRST_STEP * factor)[mine]
+        asked = [wanting[:, k] & (step[:, k] == size) for k, size in moves]
+        table = np.empty((2, len(moves), HALVINGS, len(noise)))
+        few = 0 if expected is None else FEWEST
+        for some in (slice(0, few), slice(few, HALVINGS)):
+            left = [place for place, mine in enumerate(asked) if np.any(mine)]
+            changes = [
+                {names[moves[place][0]]: moved}
+                for side in (upper, lower)
+                for place in left
+                for moved in side[place, some].tolist()
+            ]
+            if not changes:
+                continue
+            table[:, left, some] = measure(changes).reshape(2, len(left), -1, len(noise))
+            for place in left:
+                k, mine = moves[place][0], asked[place]
+                width = (upper - lower)[place, : some.stop]
+                found = extrapolated(table[0, place, : some.stop], table[1, place, : some.stop], width, noise)
+                # triangles that exclude each other know no more than their distance
+                apart = np.nan_to_num(np.abs(found.value - value[:, k]))
+                apart = np.where(apart > found.error + error[:, k], apart, 0.0)
+                fresh = np.maximum(found.error, apart)
+                known = np.maximum(error[:, k], apart)
+                sides = _sides(quantities, table[:, place, : some.stop], 0.5 * width)
+                allowed = agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / width[-1]
+                kinked = np.abs(sides[1] - sides[0]) > KINK * allowed
+                if expected is not None and some.stop < HALVINGS:
+                    enough = KNOWN * (agreement * np.abs(found.value) + quantum[:, k])
+                    mine = mine & ~kinked & (fresh <= enough) & (np.abs(found.value - expected[:, k]) <= enough)
+                    asked[place] = asked[place] & ~mine
+                better = mine & (fresh < known)
+                below[better, k] = np.where(kinked, sides[0], np.nan)[better]
+                above[better, k] = np.where(kinked, sides[1], np.nan)[better]
+                value[better, k] = found.value[better]
+                error[mine, k] = np.where(better, fresh, known)[mine]
+                wanting[mine, k] = (error[:, k] > KNOWN * (agreement * np.abs(value[:, k]) + quantum[:, k]))[mine]
+                # noise over the width of the smallest difference, twice as `extrapolated` counts it
+                noisy = 2.0 * noise / width[-1] > 0.2 * error[:, k]
+                larger = noisy & (tried == 1)
+                factor = np.where(larger, LARGER, SMALLER ** (tried - noisy.astype(float)))
+                step[mine, k] = (FIRST_STEP * factor)[mine]
     return Second(route="differences", value=value, uncertainty=error, quantities=quantities, below=below, above=above)
 
 
@@ -303,6 +317,8 @@ def _sides(here: Array, table: Array, reach: Array) -> Array:
     """
     slopes = (here - table) * np.array([-1.0, 1.0])[:, None, None] / reach[:, None]
     finer = 2.0 * slopes[:, 1:] - slopes[:, :-1]
+    if finer.shape[1] == 1:
+        return np.asarray(finer[::-1, -1])
     known = np.max(np.abs(finer[:, -1] - finer[:, -2]), axis=0) < 0.1 * np.abs(finer[0, -1] - finer[1, -1])
     return np.asarray(np.where(known, finer[::-1, -1], np.mean(finer[:, -1], axis=0)))
 

@@ -46,9 +46,11 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
     method = fine if asked == "auto" else asked
-    run = resolve(model, numbers, replace(request, method=method, kinks=None))
+    run = resolve(
+        model, numbers, replace(request, method=method, kinks=kinks_with_derivatives(request.kinks, model.manifest))
+    )
     check_count(model.manifest, numbers, run.duration, run.stretch)  # before any long computation
-    return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
+    return run.check_steady(), fine
 
 
 def differentiate(

@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 #: Steps of a triangle: the last is 2^-11 of the first.
 STEPS = 12
 
+#: So many have none of the same order beside the first extrapolation: its error is its distance from the wider one.
+FEWEST = 2
+
 #: Columns of the triangle: orders 2, 4, 6, 8; more gain nothing over rounding.
 ORDERS = 4
 
@@ -104,6 +107,8 @@ def extrapolated(upper: Array, lower: Array, width: Array, resolution: float | A
         step = np.full(column[0].shape, 0.5 * width[0])
         for order in range(1, min(len(width), ORDERS)):
             fresh = column[1:] + (column[1:] - column[:-1]) / (4.0**order - 1.0)
+            if len(width) == FEWEST:
+                best, error = fresh[0], np.abs(fresh[0] - column[0]) + 2.0 * noise[-1]
             for row, value in enumerate(fresh[1:], start=1):
                 k = row + order
                 # neighbours in the triangle, and the same order of larger steps: one sequence may agree by chance;

@@ -193,6 +193,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             quantum=quantum,
             jitter=_jittered(run),
             agreement=query.agreement,
+            expected=slopes,
         )
         with np.errstate(invalid="ignore", divide="ignore"):
             # the difference of the routes gives the uncertainty of quadratures and extremes

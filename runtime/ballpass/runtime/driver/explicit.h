@@ -6,6 +6,7 @@
    BP_NAME(f)   name of a function there
    BP_W, BP_N   numbers of a coordinate, and their type
    BP_V, BP_VS  type that sums run in, and how many make up the positions (as many the velocities)
+   BP_X, BP_XS  the same of a whole state, where it can be cut into wider ones
    BP_H         type of a step size: one for all, or one for each lane
    BP_NAME(times), BP_NAME(slope)(at, i, time, y, k)
                 what the slopes of a step need of its times; the slope k of stage i (from 1 on) with argument y at the time number `time`
@@ -14,27 +15,32 @@
 
 #define BP_AT(type, x, i) (((type *)(x))[i])
 
+#ifndef BP_X
+#define BP_X BP_V
+#define BP_XS (2 * BP_VS)
+#endif
+
 /* Vectors that a sum runs in at once: they stay in registers. */
 #undef BP_TOGETHER
-#define BP_TOGETHER (2 * BP_VS % 4 == 0 ? 4 : 2)
+#define BP_TOGETHER (BP_XS % 4 == 0 ? 4 : BP_XS % 2 == 0 ? 2 : BP_XS)
 
 /* y = x + sum of scale row[j] k[j], without x where it is NULL. */
 BP_INLINE void BP_NAME(add)(const double *restrict row, const int count, const double k[][BP_NX * BP_W], const BP_H *scale,
                             const double *restrict x, double *restrict y)
 {
 #pragma GCC unroll 16
-    for (int first = 0; first < 2 * BP_VS; first += BP_TOGETHER) {
-        BP_V sum[BP_TOGETHER];
+    for (int first = 0; first < BP_XS; first += BP_TOGETHER) {
+        BP_X sum[BP_TOGETHER];
 #pragma GCC unroll 16
-        for (int e = 0; e < BP_TOGETHER; e++) sum[e] = x ? BP_AT(const BP_V, x, first + e) : (BP_V){0.0};
+        for (int e = 0; e < BP_TOGETHER; e++) sum[e] = x ? BP_AT(const BP_X, x, first + e) : (BP_X){0.0};
         for (int j = 0; j < count; j++) {
             if (row[j] == 0.0) continue;
             const BP_H a = *scale * row[j];
 #pragma GCC unroll 16
-            for (int e = 0; e < BP_TOGETHER; e++) sum[e] += a * BP_AT(const BP_V, k[j], first + e);
+            for (int e = 0; e < BP_TOGETHER; e++) sum[e] += a * BP_AT(const BP_X, k[j], first + e);
         }
 #pragma GCC unroll 16
-        for (int e = 0; e < BP_TOGETHER; e++) BP_AT(BP_V, y, first + e) = sum[e];
+        for (int e = 0; e < BP_TOGETHER; e++) BP_AT(BP_X, y, first + e) = sum[e];
     }
 }
 
@@ -46,7 +52,7 @@ BP_INLINE void BP_NAME(combine)(const double *restrict row, const int count, con
     double sum[BP_NX * BP_W] BP_ALIGNED;
     BP_NAME(add)(row, count, k, &one, NULL, sum);
 #pragma GCC unroll 16
-    for (int e = 0; e < 2 * BP_VS; e++) BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + *(const BP_H *)h * BP_AT(BP_V, sum, e);
+    for (int e = 0; e < BP_XS; e++) BP_AT(BP_X, y, e) = BP_AT(const BP_X, x, e) + *(const BP_H *)h * BP_AT(BP_X, sum, e);
 }
 
 /* Root mean square of an error over its tolerance; not a number where the error is none. */
@@ -142,10 +148,10 @@ BP_INLINE void BP_NAME(explicit_dense)(const bp_explicit_method *restrict method
         BP_NAME(slope)(at, r + 1, r, y, k[end + 1 + r]);
     }
 #pragma GCC unroll 16
-    for (int e = 0; e < 2 * BP_VS; e++) {
-        const BP_V delta = BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e), first = h * BP_AT(BP_V, k[0], e);
-        BP_AT(BP_V, dense[0], e) = first - delta;
-        BP_AT(BP_V, dense[1], e) = 2.0 * delta - (first + h * BP_AT(BP_V, k[end], e));
+    for (int e = 0; e < BP_XS; e++) {
+        const BP_X delta = BP_AT(const BP_X, next, e) - BP_AT(const BP_X, x, e), first = h * BP_AT(BP_X, k[0], e);
+        BP_AT(BP_X, dense[0], e) = first - delta;
+        BP_AT(BP_X, dense[1], e) = 2.0 * delta - (first + h * BP_AT(BP_X, k[end], e));
     }
     for (int row = 0; row < method->dense_rows; row++)
         BP_NAME(add)(method->dense[row], end + 1 + method->dense_stages, slopes, &h, NULL, dense[2 + row]);
@@ -155,16 +161,19 @@ BP_INLINE void BP_NAME(explicit_dense)(const bp_explicit_method *restrict method
 BP_INLINE void BP_NAME(explicit_part)(const bp_explicit_method *restrict method, const double dense[][BP_NX * BP_W],
                                       const double *restrict x, const double *restrict next, double theta, int e, double *restrict y)
 {
-    BP_V inner = {0.0};
+    BP_X inner = {0.0};
 #pragma GCC unroll 16
     for (int row = 1 + method->dense_rows; row >= 0; row--)
-        inner = (BP_AT(const BP_V, dense[row], e) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-    BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + inner);
+        inner = (BP_AT(const BP_X, dense[row], e) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
+    BP_AT(BP_X, y, e) = BP_AT(const BP_X, x, e) + theta * (BP_AT(const BP_X, next, e) - BP_AT(const BP_X, x, e) + inner);
 }
 
 BP_INLINE void BP_NAME(explicit_at)(const bp_explicit_method *restrict method, const double dense[][BP_NX * BP_W], const double *restrict x,
                                     const double *restrict next, double theta, double *restrict y)
 {
 #pragma GCC unroll 16
-    for (int e = 0; e < 2 * BP_VS; e++) BP_NAME(explicit_part)(method, dense, x, next, theta, e, y);
+    for (int e = 0; e < BP_XS; e++) BP_NAME(explicit_part)(method, dense, x, next, theta, e, y);
 }
+
+#undef BP_X
+#undef BP_XS

@@ -9,7 +9,18 @@
 
 enum { BP_LOADED_MOMENTS = 3, BP_ITERATIONS = 80 };
 
-static const double BP_SOFT = 10.0, BP_FAR = 1e9, BP_RADIAN = 1.0;
+static const double BP_SOFT = 10.0, BP_ROUNDED_AWAY = 1e9, BP_RADIAN = 1.0;
+
+/* Numbers of a moment.  No side of a law is held. */
+static inline bp_numbers bp_numbers_at(const double *u, const double *p, const double *c)
+{
+#ifdef BALLPASS_LOCATED
+    static const double released[BP_EVENTS] = {0.0};
+    return (bp_numbers){.u = u, .p = p, .c = c, .border = released};
+#else
+    return (bp_numbers){.u = u, .p = p, .c = c};
+#endif
+}
 
 /* A state at rest, moment i of so many: angles are spread over a turn, and keep their velocities. */
 static inline void bp_at_moment(const double *rest, long i, long moments, double *x)
@@ -123,7 +134,7 @@ static inline double bp_apart(const double *x, int group)
 static inline int bp_is_gone(const double *x)
 {
     int gone = 0;
-    for (int g = 0; g < BP_NQ; g++) gone |= bp_largest_of(x, g) > BP_FAR * bp_apart(x, g);
+    for (int g = 0; g < BP_NQ; g++) gone |= bp_largest_of(x, g) > BP_ROUNDED_AWAY * bp_apart(x, g);
     return gone;
 }
 
@@ -200,7 +211,7 @@ static inline int bp_loaded_moments(const double *p, const double *c, const doub
     double loaded[BP_LOADED_MOMENTS], a[BP_NQ], A[BP_NQ * BP_NQ], x[BP_NX];
     int kept = 0;
     for (long i = 0; i < moments; i++) {
-        const bp_numbers n = {.u = u + i * BP_NU, .p = p, .c = c};
+        const bp_numbers n = bp_numbers_at(u + i * BP_NU, p, c);
         bp_at_moment(rest, i, moments, x);
         bp_field(&n, x, a, A);
         double size = bp_largest_of(a, group);
@@ -238,7 +249,7 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         for (int k = 0; k < BP_NQ; k++) any |= bp_group[k] == g;
         const int kept = any ? bp_loaded_moments(p, c, rest, moments, u, g, which, &highest[g]) : 0;
         for (int i = 0; i < kept; i++) {
-            const bp_numbers n = {.u = u + which[i] * BP_NU, .p = p, .c = c};
+            const bp_numbers n = bp_numbers_at(u + which[i] * BP_NU, p, c);
             double x[BP_NX];
             bp_at_moment(rest, which[i], moments, x);
             /* a light ring has enormous accelerations on the way: then the forces have to fall */

@@ -17,6 +17,9 @@
    after another. */
 enum { BP_EVEN = BP_NQ & -BP_NQ, BP_WIDTH = BP_EVEN < 8 ? BP_EVEN : 8 };
 typedef double bp_wide __attribute__((vector_size(BP_WIDTH * sizeof(double)), aligned(8), may_alias));
+/* The same of a whole state: of an odd number of coordinates positions and velocities in pairs. */
+enum { BP_STATE_WIDTH = BP_WIDTH < 4 && 2 * BP_EVEN > BP_WIDTH ? 2 * BP_EVEN : BP_WIDTH };
+typedef double bp_whole __attribute__((vector_size(BP_STATE_WIDTH * sizeof(double)), aligned(8), may_alias));
 
 /* Slopes and times of an explicit step. */
 typedef struct {
@@ -76,6 +79,8 @@ BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
 #define BP_VS (BP_NQ / BP_WIDTH)
 #define BP_H double
 #define BP_S bp_wide
+#define BP_X bp_whole
+#define BP_XS (BP_NX / BP_STATE_WIDTH)
 #include "explicit.h"
 #include "rosenbrock.h"
 #include "iteration_matrix.h"

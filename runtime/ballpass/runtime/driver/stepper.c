@@ -10,9 +10,7 @@
 #include "locate.h"
 #include "observe.h"
 #include "run.h"
-#ifndef BALLPASS_LOCATED
 #include "scales.h"
-#endif
 
 static double estimate_step(bp_run *run, double t, double longest)
 {
@@ -377,13 +375,11 @@ int ballpass_run_tangents(const ballpass_options *options, const double *p, cons
 long ballpass_tangent_work(long blocks) { return blocks * (long)sizeof(bp_tangent_block); }
 #endif
 
-#ifndef BALLPASS_LOCATED
 void ballpass_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs, double horizon,
                         double *magnitude)
 {
     bp_magnitudes(p, c, initial, moments, inputs, horizon, magnitude);
 }
-#endif
 
 void ballpass_sizes(int *sizes)
 {

@@ -118,10 +118,8 @@ BALLPASS_EXPORT long ballpass_tangent_work(long blocks);
 
    inputs       u at so many moments spread over the run, row after row
    horizon      a turn, or the run: bounds the travel of a body that nothing holds [s] */
-#ifndef BALLPASS_LOCATED
 BALLPASS_EXPORT void ballpass_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs,
                                        double horizon, double *magnitude);
-#endif
 
 /* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of the work of a run in several calls;
    numbers of a step that is kept; bytes of options, result and tangents. */

@@ -297,7 +297,6 @@ def _alone(
         state=work.end[member],
         time=0.0 if begun is None else float(begun["time"]),
         stop=work.stop,
-        stepper=None if work.driver is None else work.driver.stepper,
         steps=0 if begun is None else int(begun["steps"]),
         rejected=0 if begun is None else int(begun["rejected"]),
     )

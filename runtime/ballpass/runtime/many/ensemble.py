@@ -38,7 +38,7 @@ from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.request.choose_method import choose_method
-from ballpass.runtime.request.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.request.locating import LOCATED, Kinks, choose_kinks
 from ballpass.runtime.request.request import asked_length, check_memory
 from ballpass.runtime.request.request import tolerance as relative_tolerance
 from ballpass.runtime.run.loop import RunFailed
@@ -243,8 +243,6 @@ def simulate_many(
         "Run the table in parts of some millions of members: they do not depend on each other.",
     )
     driver = model.ensemble_driver if model.states else None
-    if driver is not None and at_kinks == LOCATED and has_kinks(manifest):
-        driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns)
     skipped = model.run_settings.transient_cycles if transient is None else real(transient)
     span = _spans(model, members, cycles, duration, skipped)

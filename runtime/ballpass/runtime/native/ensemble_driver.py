@@ -7,7 +7,6 @@ The library also holds the driver of single runs, there with reductions; plain r
 
 from __future__ import annotations
 
-import copy
 import ctypes
 from dataclasses import dataclass
 
@@ -19,7 +18,7 @@ from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import check_sizes, open_driver
 from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, Stepper, method_numbers
+from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, method_numbers
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
@@ -82,7 +81,6 @@ class EnsembleDriver:
 
     Attributes
     ----------
-    stepper : driver of single runs, with reductions, by `with_stepper`
     rows : layout of the reductions
     lanes : members that advance together
     schedule : segments of many members
@@ -92,8 +90,6 @@ class EnsembleDriver:
     ArtefactError
         The library's sizes are not those of the manifest or of this module.
     """
-
-    stepper: Stepper
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.rows = reduction_rows(manifest)
@@ -112,12 +108,6 @@ class EnsembleDriver:
         results = (DOUBLES, DOUBLES, ArrayOf(RESULT))
         options = ctypes.POINTER(_EnsembleOptions)
         declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *results)
-
-    def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
-        """The same with a driver of single runs, which must have reductions."""
-        found = copy.copy(self)
-        found.stepper = stepper
-        return found
 
     def carry(self, members: int) -> Carried:
         """What so many members carry, before their first call."""

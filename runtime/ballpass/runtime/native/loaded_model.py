@@ -150,7 +150,7 @@ class LoadedModel(CompiledFunctions):
     @property
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
-        return self._driver(EnsembleDriver, ENSEMBLE).with_stepper(self.stepper)
+        return self._driver(EnsembleDriver, ENSEMBLE)
 
     def _driver(self, kind: type[_Driver], sources: DriverSources) -> _Driver:
         """A driver, compiled once, however many threads ask for it."""

@@ -7,7 +7,16 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 #: Names of the figures of a run, in their order.
-NAMES = ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak_moment", "shaft_loads")
+NAMES = (
+    "load_curve",
+    "orbit",
+    "displacements",
+    "spectra",
+    "phase_portrait",
+    "ball_loads",
+    "peak_moment",
+    "shaft_loads",
+)
 
 #: Kinds of files of a moving picture.
 MOVING = ("html", "mp4", "gif")

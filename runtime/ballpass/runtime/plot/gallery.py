@@ -65,6 +65,7 @@ def _has_moment(record: Record) -> bool:
 FIGURES = (
     FigureKind("load_curve", _has_load_curve, loads.load_curve, "reaction and load on the ring over an angle (Fig. 4)"),
     FigureKind("orbit", _has_orbit, motion.orbit, "path of the inner ring's centre (Fig. 5)"),
+    FigureKind("displacements", _has_orbit, motion.displacements, "positions of the ring's centre over angle or time"),
     FigureKind("spectra", _has_spectra, motion.spectra, "displacement amplitude spectra along x and y (Fig. 6)"),
     FigureKind("phase_portrait", _has_phases, motion.phase_portrait, "velocity over displacement along x (Fig. 7)"),
     FigureKind("ball_loads", _has_balls, loads.ball_loads, "contact load of every ball over two turns (Fig. 8)"),

@@ -8,7 +8,18 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.plot import PAPER
 from ballpass.runtime.plot.record import Array, Record
-from ballpass.runtime.plot.style import FIRST, GREY, INK, SECOND, frame, legend_above, new_figure, shade_windows, styled
+from ballpass.runtime.plot.style import (
+    FIRST,
+    GREY,
+    INK,
+    SECOND,
+    frame,
+    legend_above,
+    mark_angles,
+    new_figure,
+    shade_windows,
+    styled,
+)
 from ballpass.runtime.time.turning import past
 
 #: Part of the turns in the enlarged panel of ball loads, and part of the time below which high loads are rare.
@@ -140,8 +151,7 @@ def ball_loads(record: Record) -> Figure:
     first = grid[-1, 0]
     first.set_xlim(float(along.min()), float(along.max()))
     if record.turns:
-        degree = 90.0 * max(1.0, np.ceil((along.max() - along.min()) / (1080.0 if not closer else 540.0)))
-        first.set_xticks(np.arange(np.ceil(along.min() / degree) * degree, along.max() + 1e-6, degree))
+        mark_angles(first, along, 6 if closer else 12)
     first.set_xlabel(label)
     if closer:
         grid[-1, 1].set_xlim(*moment)

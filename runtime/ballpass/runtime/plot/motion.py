@@ -20,10 +20,13 @@ from ballpass.runtime.plot.style import (
     GREY,
     INK,
     SAND,
+    SECOND,
     SIGNAL,
     frame,
     legend_above,
+    mark_angles,
     new_figure,
+    shade_windows,
     styled,
 )
 from ballpass.runtime.time.turning import past
@@ -144,6 +147,32 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
         look: dict[str, Any] = {"color": APPLIED, "linestyle": "-", "linewidth": 1.9}
         axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), label=label, **look)
         label = "_nolegend_"
+
+
+@styled
+def displacements(record: Record) -> Figure:
+    """Positions of the ring's centre along x and y over the last two turns, those of an elastic outer ring beside."""
+    window = record.last_turns(2)
+    along, label = record.along(window)
+    figure = new_figure(4.6, layout=None)
+    panels = figure.subplots(2, 1, sharex=True)
+    windows = record.load_windows() if record.turns else ()
+    for axes, axis in zip(panels, "xy", strict=True):
+        for ring, look in (("inner", FIRST), ("outer", SECOND)):
+            if record.has(f"{ring}.{axis}"):
+                axes.plot(along, 1e6 * record.values(f"{ring}.{axis}")[window], label=f"{ring} ring", **look)
+        shade_windows(axes, windows, range(-1, int(along.max() // 360.0) + 1))
+        axes.set_ylabel(f"{axis} [µm]")
+    panels[1].set_xlim(float(along.min()), float(along.max()))
+    if record.turns:
+        mark_angles(panels[1], along, 12)
+    panels[1].set_xlabel(label)
+    if record.has("outer.x"):
+        legend_above(figure, *panels[0].get_legend_handles_labels())
+    shown = "Last two turns" if len(record.turns) >= 2 else "Last turn" if record.turns else "The whole record"
+    text = f"{shown}; x and y have their own scales.{' Shaded: an applied load acts.' if windows else ''}"
+    frame(figure, record.title("Displacements of the inner ring's centre"), f"{text} {record.settings()}.", hspace=0.12)
+    return figure
 
 
 @styled

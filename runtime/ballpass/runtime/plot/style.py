@@ -209,6 +209,12 @@ def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Ite
             axes.axvspan(start + 360.0 * turn, end + 360.0 * turn, color=PALE, linewidth=0, zorder=0)
 
 
+def mark_angles(axes: Axes, along: NDArray[np.float64], most: int) -> None:
+    """Ticks at quarters of turns, or at multiples of these, at most so many or one more, on an axis in degrees."""
+    degree = 90.0 * max(1.0, np.ceil((along.max() - along.min()) / (90.0 * most)))
+    axes.set_xticks(np.arange(np.ceil(along.min() / degree) * degree, along.max() + 1e-6, degree))
+
+
 def legend_above(figure: Figure, *args: Any, **kwargs: Any) -> None:
     """A legend in the corner right of the title; arguments as for `Figure.legend`."""
     figure.legend(*args, **kwargs, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))

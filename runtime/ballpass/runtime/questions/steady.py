@@ -285,10 +285,12 @@ def steady(
     from ballpass.runtime.motion.contact_sequence import contact_sequence
     from ballpass.runtime.motion.forcing_period import common_period, forcing_period, refuse_free_driver, sampled_turns
     from ballpass.runtime.motion.shooting import Shooting
+    from ballpass.runtime.request.locating import kinks_with_derivatives, stepper_for
     from ballpass.runtime.time.repetition import Repetition
 
     manifest = model.manifest
-    _ = model.stepper  # refused here where a scene has none
+    # refused here where a scene has none
+    _ = stepper_for(model, kinks_with_derivatives(None, manifest), derivatives=True)
     ends = None if over is None else parameter_range(manifest.parameters, "over", over)
     given = {**(parameters or {}), **({ends.name: ends.low} if ends else {})}
     numbers = model.numbers(given)

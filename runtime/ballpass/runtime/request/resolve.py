@@ -17,7 +17,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.request.assembly import check_assembly, may_lock
 from ballpass.runtime.request.choose_method import choose_method
-from ballpass.runtime.request.locating import Kinks, choose_kinks
+from ballpass.runtime.request.locating import Kinks, choose_kinks, stepper_for
 from ballpass.runtime.request.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.request.request import Request, asked_length, tolerance
 from ballpass.runtime.request.start import start_state, start_time
@@ -141,8 +141,11 @@ def resolve(
             f"method {method}: a torque may turn the driver to the end of its range, or to where the linkage locks, "
             "and only the project's own stepper finds when. Take --method stepper; it needs a C compiler."
         )
+    kinks = choose_kinks(request.kinks, method, model.manifest, rtol)
     if method in STEPPERS:
-        magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, stretch, span.begin)
+        # by the library that will run: each takes seconds to compile
+        driver = stepper_for(model, kinks)
+        magnitude = stepper_magnitudes(model, driver, numbers, initial, looked_at, stretch, span.begin)
     elif model.states:
         magnitude = model_scales(model, numbers, initial, looked_at, stretch, span.begin).magnitude
     return Run(
@@ -153,7 +156,7 @@ def resolve(
         method=method,
         reason=reason,
         rtol=rtol,
-        kinks=choose_kinks(request.kinks, method, model.manifest, rtol),
+        kinks=kinks,
         magnitude=magnitude,
         progress=request.progress,
     )

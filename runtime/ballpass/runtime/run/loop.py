@@ -195,7 +195,6 @@ class RunUnderWay:
     time : from which it can continue [s]
     reached : time reached [s]
     stop : ends it between calls when it becomes nonzero
-    stepper : an existing driver; None for the one that the run needs
     segments : of the whole run, where they are known and one window; None: they are made
     steps, rejected, located, calls : counts; `located` of kinks
     families : the last family of an automatic choice, call by call
@@ -206,7 +205,6 @@ class RunUnderWay:
     state: np.ndarray
     time: float
     stop: ctypes.c_int | None = None
-    stepper: Stepper | None = None
     segments: Segments | None = None
     steps: int = 0
     rejected: int = 0
@@ -225,7 +223,7 @@ class RunUnderWay:
         """
         run, until = self.run, self.run.end if until is None else until
         directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
-        stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
+        stepper = stepper_for(run.model, run.kinks, derivatives=directions is not None)
         watched = next((sink for sink in self.sinks if isinstance(sink, KeptSteps)), None)
         if watched is None and may_lock(run.model, run.numbers):
             watched = KeptSteps(numbers=stepper.kept)

@@ -94,11 +94,13 @@ def _signal_class(spec: ClassSpec, signals: Signals, stages: Stages) -> SignalCl
     from ballpass.runtime.many.data_set import SignalClass
     from ballpass.runtime.many.signals import check_outputs
     from ballpass.runtime.model import load_own
+    from ballpass.runtime.request.locating import choose_kinks, stepper_for
 
     unknown = partial(check_outputs, signals=signals, label=spec.label)
     folder = generate(spec.scene, progress=stages, inspect=unknown)
     stages("compiling")
     model = load_own(folder)
     if model.has_stepper:
-        _ = model.stepper  # compiled here, where it is announced, and found by workers on this machine
+        # compiled here, where it is announced, and found by workers on this machine
+        _ = stepper_for(model, choose_kinks(None, "stepper", model.manifest, model.manifest.run.rtol))
     return SignalClass(label=spec.label, model=model, members=spec.members, parameters=spec.parameters)

@@ -296,10 +296,9 @@ def load_model(
 
     model = read_own(scene, stages, compiled, lambda model: model.manifest, inspect)
     if model.has_stepper and method in ("auto", *STEPPERS):
-        _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol
         chosen = choose_kinks(kinks, "stepper" if method == "auto" else method, model.manifest, tolerance)
-        _ = stepper_for(model, chosen)
+        _ = stepper_for(model, chosen)  # compiled here, where it is announced
     return model
 
 

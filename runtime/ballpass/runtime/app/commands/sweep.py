@@ -139,9 +139,7 @@ def sweep(
             model = load_model(
                 scene,
                 stages,
-                method or source.run.method,
-                kinks,
-                rtol,
+                "",
                 asked=asked_of(source, overrides),
                 needs="ballpass sweep",
                 inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
