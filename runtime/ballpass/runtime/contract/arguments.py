@@ -15,7 +15,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
-from typing import Any, TypeVar, cast
+from typing import Any, TypeGuard, TypeVar, cast
 
 from ballpass.runtime.contract.errors import RequestError
 
@@ -53,8 +53,6 @@ _EXPECTED = {
     "Progress": "a function that takes the finished fraction, True, False or None",
     "Callable[[str, float], None] | bool": "a function that takes words and the finished fraction, True, False or None",
 }
-#: The annotations that are checked.
-_KINDS = frozenset(kind + none for kind in _EXPECTED for none in ("", " | None"))
 _EXAMPLES = {
     "outputs": '["inner.y"]',
     "of": '["rms:inner.y"]',
@@ -162,7 +160,7 @@ def _is_file_name(path: str | bytes) -> bool:
     return b"\0" not in name and len(name) <= _LONGEST_PATH and max(map(len, re.split(rb"[/\\]", name))) <= _LONGEST
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is one real number, also as NumPy has them."""
     if getattr(value, "shape", None) == ():
         value = value.item()  # type: ignore[attr-defined]
@@ -172,7 +170,6 @@ def is_number(value: object) -> bool:
 def typed(function: _Function) -> _Function:
     """The function that first refuses arguments of a wrong type with a `RequestError`, as a decorator."""
     written = {name: _without_modules(kind) for name, kind in function.__annotations__.items() if name != "return"}
-    kinds = {name: kind for name, kind in written.items() if kind in _KINDS}
     arguments = inspect.signature(function)
 
     @functools.wraps(function)
@@ -182,7 +179,7 @@ def typed(function: _Function) -> _Function:
         for name, kind in written.items():
             if name in values:
                 values[name] = plain(kind, values[name])
-        faults = [type_fault(name, kind, values[name]) for name, kind in kinds.items() if name in values]
+        faults = [type_fault(name, kind, values[name]) for name, kind in written.items() if name in values]
         if any(faults):
             raise RequestError("\n".join(filter(None, faults)))
         return function(*bound.args, **bound.kwargs)
