@@ -117,7 +117,7 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
     if expected == _NAMES:
         several = isinstance(value, Iterable) and not isinstance(value, bytes | set | frozenset)
         return several and all(isinstance(item, str) for item in value)
-    if expected == _TEXT:
+    if expected == _TEXT or kind == "Coupling":
         return isinstance(value, str)
     if expected == _PATH:
         # an empty one would be the working directory
@@ -129,8 +129,6 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
         return _fits(_PATH, "str | Path", value) or _fits(expected, "Scene", value)
     if kind.startswith("Sequence["):
         return isinstance(value, Sequence) and all(_fits(expected, kind[9:-1], item) for item in value)
-    if kind == "Coupling":
-        return isinstance(value, str)
     if kind.startswith("Callable[") and "True" not in expected:
         return callable(value)
     if kind == "bool":

@@ -85,7 +85,6 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
     def worded(text: str) -> str:
         return element_words(text, [bearing.element for bearing in scene.bearings])
 
-    never = [*map(worded, _NEVER)]
     return {
         "scene": scene.name,
         "mechanism": scene.mechanism is not None,
@@ -93,7 +92,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "file": str(path),
         "files_of_columns": list(scene.notes),
         "modelled": parts,
-        "not_modelled": [*_absent(scene), *never, *_of_drive(scene)],
+        "not_modelled": [*_absent(scene), *map(worded, _NEVER), *_of_drive(scene)],
         "functions": {f.name: {"operations": f.operations, "what": worded(f.description)} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
         **said.to_json(),
