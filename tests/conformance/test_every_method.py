@@ -19,6 +19,7 @@ from scipy.integrate import DOP853 as ScipyDop853
 from scipy.integrate import RK45
 from stepper_methods import EXPLICIT, IMPLICIT, ORDERS, TABLEAUS
 
+from ballpass.runtime.contract.method_registry import OWN
 from ballpass.runtime.contract.methods.dop853 import METHOD as DOP853
 from ballpass.runtime.contract.methods.dp54 import METHOD as DORMAND_PRINCE_54
 from ballpass.runtime.contract.methods.rodas4 import METHOD as RODAS4
@@ -54,6 +55,11 @@ def named(names: Iterable[str]) -> pytest.MarkDecorator:
 
 
 every_method, explicit_methods, implicit_methods = named(TABLEAUS), named(EXPLICIT), named(IMPLICIT)
+
+
+def test_methods_are_numbered_without_gaps() -> None:
+    """Exported programs take the numbers."""
+    assert [tableau.number for tableau in OWN.values()] == list(range(1, len(OWN) + 1))
 
 
 def test_docs_have_a_row_of_every_method() -> None:

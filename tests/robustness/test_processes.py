@@ -747,7 +747,7 @@ LOADING = """
     wrong = 0
     for _ in range(int(sys.argv[3])):
         scene = Path(sys.argv[1])
-        model = load_model(scene, lambda name: None, "none", asked=read_asked(scene, None))
+        model = load_model(scene, lambda name: None, "none", integrated=read_asked(scene, None)[0].integrated)
         wrong += abs(model.parameters["bearing.clearance"] - float(sys.argv[2])) > 1e-12
     print(wrong)
 """

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.kept_parts import Arrays, KeptParts
+from ballpass.runtime.ask.kept_parts import ENDING, Arrays, KeptParts, refuse_other_files
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.shares import drawn_members
 
 CLEARANCE = "bearing.clearance=2 um:15 um"
@@ -90,3 +91,13 @@ def test_parts_of_another_request_and_cut_files_are_not_taken(tmp_path: Path) ->
     for path in tmp_path.iterdir():
         path.write_bytes(path.read_bytes()[:50])
     assert first.once(key, lambda: (2.0 * key,))[0].tolist() == [0.0, 2.0, 4.0]
+
+
+def test_a_folder_in_which_a_part_was_being_written_is_no_file_of_others(tmp_path: Path) -> None:
+    """What a killed call leaves; a folder in the place of a part is the user's."""
+    name = f"{32 * '0'}{ENDING}"
+    (tmp_path / f".{name}-abcd_123").mkdir()
+    refuse_other_files(tmp_path)
+    (tmp_path / name).mkdir()
+    with pytest.raises(RequestError, match=f"no parts of a computation are there \\({name}\\)"):
+        refuse_other_files(tmp_path)

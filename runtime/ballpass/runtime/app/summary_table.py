@@ -170,11 +170,7 @@ def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
         for key, value in told.items()
         if value is not None
     ]
-    laws = {
-        key.removesuffix("damping_law").removesuffix("."): law
-        for key, law in summary.items()
-        if key == "damping_law" or key.endswith(".damping_law")
-    }
+    laws = {key.rpartition(".")[0]: law for key, law in summary.items() if key.rpartition(".")[2] == "damping_law"}
     alike = len(set(laws.values())) == 1
     each = [next(iter(laws.values()))] if alike else [f"{law} in {bearing}" for bearing, law in laws.items()]
     law = [f"damping law {', '.join(each)}"] if laws else []

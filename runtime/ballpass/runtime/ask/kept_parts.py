@@ -9,6 +9,7 @@ import hashlib
 import io
 import os
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -27,8 +28,9 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 #: Ending of a part's file, and bytes of the digest at its end.
 ENDING, SEAL = ".ballpass-part", 64
 
-#: Names of parts, and of those that were being written when the process was killed.
-_PART = re.compile(rf"[0-9a-f]{{32}}{ENDING}|\.[0-9a-f]{{32}}{ENDING}-[a-z0-9_]{{8}}")
+#: Names of parts, and of folders in which one was being written when the process was killed.
+_PART = re.compile(rf"[0-9a-f]{{32}}{ENDING}")
+_LEFT = re.compile(rf"\.{_PART.pattern}-[a-z0-9_]{{8}}")
 
 #: Arrays of a part; texts as well, but no objects.
 Arrays = tuple[np.ndarray, ...]
@@ -114,7 +116,10 @@ def kept_parts(folder: str | Path | None, model: LoadedModel, *decides: Any) -> 
     try:
         for path in place.iterdir():
             if path.name.removeprefix(".").partition(".")[0] in parts.used:
-                path.unlink(missing_ok=True)
+                if path.is_dir():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink(missing_ok=True)
         if not place.is_symlink() and not any(place.iterdir()):
             place.rmdir()
     except OSError as fault:
@@ -128,7 +133,7 @@ def kept_parts(folder: str | Path | None, model: LoadedModel, *decides: Any) -> 
 def refuse_other_files(place: Path) -> None:
     """Refuse a folder for parts that holds files of others, before anything is computed."""
     if place.is_dir():
-        others = sorted(path.name for path in place.iterdir() if not _PART.fullmatch(path.name) or not path.is_file())
+        others = sorted(p.name for p in place.iterdir() if not (_PART if p.is_file() else _LEFT).fullmatch(p.name))
     else:
         others = [place.name] if os.path.lexists(place) else []
     if others:

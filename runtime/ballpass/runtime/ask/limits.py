@@ -64,7 +64,21 @@ def read_limits(
     RequestError
         Another form, an unknown quantity, a wrong unit, or hours where the speed is not one number.
     """
-    return [_read(manifest, option, text, model, parameters or {}, varied) for text in texts]
+    found = []
+    for text in texts:
+        name, sign, written = limited(option, text)
+        quantity = parse_quantity_name(manifest, name)
+        try:
+            if quantity.unit == "turns":
+                value, in_hours = _life(option, written)
+                if in_hours and model is not None:
+                    value *= 3600.0 * _speed(model, option, quantity.channel, parameters or {}, varied) / TURN
+            else:
+                value = parse_quantity(written, quantity.unit or "1")
+        except QuantityError as error:
+            raise RequestError(f"{option} {name}: {error}") from None
+        found.append(Limit(quantity=name, unit=quantity.unit, upper=sign == "<=", limit=value))
+    return found
 
 
 def limited(option: str, text: str) -> tuple[str, str, str]:
@@ -76,45 +90,14 @@ def limited(option: str, text: str) -> tuple[str, str, str]:
     return name, sign, written
 
 
-def _read(
-    manifest: Manifest,
-    option: str,
-    text: str,
-    model: LoadedModel | None,
-    parameters: Mapping[str, float],
-    varied: Sequence[str],
-) -> Limit:
-    name, sign, written = limited(option, text)
-    quantity = parse_quantity_name(manifest, name)
-    unit = quantity.unit
-    try:
-        if unit == "turns":
-            value = _turns(written, model, option, quantity.channel, parameters, varied)
-        else:
-            value = parse_quantity(written, unit or "1")
-    except QuantityError as error:
-        raise RequestError(f"{option} {name}: {error}") from None
-    return Limit(quantity=name, unit=unit, upper=sign == "<=", limit=value)
-
-
-def _turns(
-    written: str,
-    model: LoadedModel | None,
-    option: str,
-    channel: str,
-    parameters: Mapping[str, float],
-    varied: Sequence[str],
-) -> float:
-    """A life, given in hours or turns [turns]."""
+def _life(option: str, written: str) -> tuple[float, bool]:
+    """The number of a life, and whether it is in hours, not turns."""
     match = re.fullmatch(r"(\S+?)\s*(h|turns)", written)
     if match is None:
         raise RequestError(
             f'{option}: {written!r:.80} is no life. Give hours or turns, as in "20000 h" or "1e9 turns".'
         )
-    value = parse_quantity(match[1], "1")
-    if match[2] == "h" and model is not None:
-        value *= 3600.0 * _speed(model, option, channel, parameters, varied) / TURN
-    return value
+    return parse_quantity(match[1], "1"), match[2] == "h"
 
 
 def _speed(

@@ -21,12 +21,12 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import STEPPERS
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
 from ballpass.runtime.request.locating import LOCATED, STEPPED_OVER
 from ballpass.runtime.request.resolve import Run
+from ballpass.runtime.run.reductions import Reduction
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.span import Span
@@ -92,15 +92,15 @@ def refine_peaks(
     model: LoadedModel, numbers: Numbers, solution: Solution, wanted: Sequence[tuple[str, Kind]]
 ) -> list[Peak]:
     """Several peaks of one run; else as `refine_peak`."""
-    sampled = [_of_samples(solution, name, kind) for name, kind in wanted]
-    found = [_of_steps(solution, name, kind, peak) for (name, kind), peak in zip(wanted, sampled, strict=True)]
-    left = [
-        k
-        for k, ((name, kind), peak) in enumerate(zip(wanted, found, strict=True))
-        if peak.searched == "samples"
-        and not _of_any_ball(solution, name, kind)
-        and has_quantities(solution, name, model)
-    ]
+    found = [_of_samples(solution, name, kind) for name, kind in wanted]
+    left = []
+    for k, (name, kind) in enumerate(wanted):
+        if kind == "min" and solution[name].ndim == 2:
+            continue  # steps give the smallest force of the most loaded ball, not that of any
+        if solution.reductions is not None and name in solution.reductions:
+            found[k] = _of_steps(solution.reductions[name], kind, found[k])
+        elif has_quantities(solution, name, model):
+            left.append(k)
     if left and len(solution) > 1:
         quantities = quantities_of(model, [f"{kind}:{name}" for name, kind in (wanted[k] for k in left)])
         estimates = QuantityRun(model, quantities).measure(run_of(model, numbers, solution)).estimates
@@ -152,11 +152,6 @@ def _is_of_time(model: LoadedModel, name: str) -> bool:
     return not depends(model, name, "x")
 
 
-def _of_any_ball(solution: Solution, name: str, kind: Kind) -> bool:
-    """Whether the smallest force of any ball is asked for, where steps give that of the most loaded one."""
-    return kind == "min" and solution[name].ndim == 2
-
-
 def _of_samples(solution: Solution, name: str, kind: Kind) -> Peak:
     if not (isinstance(kind, str) and kind in SIGNS):
         raise RequestError(f"kind: 'max' or 'min' is expected, not {kind!r}.")
@@ -170,18 +165,8 @@ def _of_samples(solution: Solution, name: str, kind: Kind) -> Peak:
     return Peak(value=value, time=float(solution.t[k]), ball=column + 1 if samples.ndim == 2 else None, sampled=value)
 
 
-def _of_steps(solution: Solution, name: str, kind: Kind, peak: Peak) -> Peak:
-    """The extreme that the run's own reductions hold, where they hold it."""
-    reductions = solution.reductions
-    if reductions is None or name not in reductions:
-        return peak
-    of_balls = name in reduction_rows(solution.manifest).balls
-    if of_balls and kind == "min":
-        return peak  # the reductions hold the minimum of the most loaded ball, not that of any ball
-    entry = reductions[name]
-    value, time, ball = (
-        (entry.maximum, entry.maximum_time, entry.maximum_ball)
-        if kind == "max"
-        else (entry.minimum, entry.minimum_time, entry.minimum_ball)
-    )
-    return Peak(value=value, time=time, ball=ball, sampled=peak.sampled, searched="every step")
+def _of_steps(found: Reduction, kind: Kind, peak: Peak) -> Peak:
+    """The extreme that the run's own reductions hold."""
+    largest = (found.maximum, found.maximum_time, found.maximum_ball)
+    value, time, ball = largest if kind == "max" else (found.minimum, found.minimum_time, found.minimum_ball)
+    return replace(peak, value=value, time=time, ball=ball, searched="every step")

@@ -15,7 +15,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
-from typing import Any, TypeVar, cast
+from typing import Any, TypeGuard, TypeVar, cast
 
 from ballpass.runtime.contract.errors import RequestError
 
@@ -53,8 +53,6 @@ _EXPECTED = {
     "Progress": "a function that takes the finished fraction, True, False or None",
     "Callable[[str, float], None] | bool": "a function that takes words and the finished fraction, True, False or None",
 }
-#: The annotations that are checked.
-_KINDS = frozenset(kind + none for kind in _EXPECTED for none in ("", " | None"))
 _EXAMPLES = {
     "outputs": '["inner.y"]',
     "of": '["rms:inner.y"]',
@@ -119,7 +117,7 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
     if expected == _NAMES:
         several = isinstance(value, Iterable) and not isinstance(value, bytes | set | frozenset)
         return several and all(isinstance(item, str) for item in value)
-    if expected == _TEXT:
+    if expected == _TEXT or kind == "Coupling":
         return isinstance(value, str)
     if expected == _PATH:
         # an empty one would be the working directory
@@ -131,8 +129,6 @@ def _fits(expected: str, kind: str, value: Any) -> bool:
         return _fits(_PATH, "str | Path", value) or _fits(expected, "Scene", value)
     if kind.startswith("Sequence["):
         return isinstance(value, Sequence) and all(_fits(expected, kind[9:-1], item) for item in value)
-    if kind == "Coupling":
-        return isinstance(value, str)
     if kind.startswith("Callable[") and "True" not in expected:
         return callable(value)
     if kind == "bool":
@@ -162,7 +158,7 @@ def _is_file_name(path: str | bytes) -> bool:
     return b"\0" not in name and len(name) <= _LONGEST_PATH and max(map(len, re.split(rb"[/\\]", name))) <= _LONGEST
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is one real number, also as NumPy has them."""
     if getattr(value, "shape", None) == ():
         value = value.item()  # type: ignore[attr-defined]
@@ -172,7 +168,6 @@ def is_number(value: object) -> bool:
 def typed(function: _Function) -> _Function:
     """The function that first refuses arguments of a wrong type with a `RequestError`, as a decorator."""
     written = {name: _without_modules(kind) for name, kind in function.__annotations__.items() if name != "return"}
-    kinds = {name: kind for name, kind in written.items() if kind in _KINDS}
     arguments = inspect.signature(function)
 
     @functools.wraps(function)
@@ -182,7 +177,7 @@ def typed(function: _Function) -> _Function:
         for name, kind in written.items():
             if name in values:
                 values[name] = plain(kind, values[name])
-        faults = [type_fault(name, kind, values[name]) for name, kind in kinds.items() if name in values]
+        faults = [type_fault(name, kind, values[name]) for name, kind in written.items() if name in values]
         if any(faults):
             raise RequestError("\n".join(filter(None, faults)))
         return function(*bound.args, **bound.kwargs)

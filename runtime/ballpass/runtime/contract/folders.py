@@ -78,18 +78,8 @@ def refuse_other(path: Path) -> None:
 
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file: the old one or the new one, never half of it."""
-    refuse_other(path)
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(content)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # with mkstemp's 0600 other users could not read it
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with replaced(path) as made:
+        made.write_bytes(content)
 
 
 @contextlib.contextmanager

@@ -55,6 +55,8 @@ def from_plain(kind: Any, value: Any, place: str) -> Any:
     else:
         plain = (int, float) if kind is float else kind
         fits = origin is None and isinstance(value, plain) and (kind is bool or not isinstance(value, bool))
+    if kind is str:  # of titles and names, which are printed: nothing that a terminal obeys
+        kind, fits = "printable text", fits and value.isprintable()
     if not fits:
         raise ValueError(f"{place}: {kind} is expected, not {value!r:.80}")
     return float(value) if kind is float else value

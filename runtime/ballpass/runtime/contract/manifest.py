@@ -528,11 +528,10 @@ class Manifest(ShortRepr):
                 f"{source}: the digest in it, {digest!r:.20}, is not that of its content: edited or cut short. "
                 f"{again}, or load it with verify=False if the edit is intended."
             )
-        _check_texts(document, "manifest", source)
         try:
             manifest = from_plain(cls, document, "manifest")
         except ValueError as fault:
-            raise ArtefactError(f"{source}: {fault}. {again} instead of editing it.") from None
+            raise ArtefactError(f"{source}: {fault}. {again}, and load only folders you trust.") from None
         assert isinstance(manifest, cls)
         libraries = {info.library for info in manifest.functions}
         for name in (manifest.scene, *(name for name, _ in manifest.files), *sorted(libraries)):
@@ -553,17 +552,6 @@ def force_components(name: str) -> tuple[tuple[str, str], tuple[str, str]]:
 def table_direction(name: str) -> str:
     """Name of the parameter that holds the direction [rad] of an applied force whose amount is a table's."""
     return f"mechanism.forces.{name}.direction"
-
-
-def _check_texts(value: Any, place: str, source: str) -> None:
-    """Refuse texts with sequences that steer a terminal: titles and names are printed."""
-    if isinstance(value, str) and not value.isprintable():
-        raise ArtefactError(
-            f"{source}: {place} holds {value!r:.80}. Allowed: printable characters. Write the folder again with "
-            "`ballpass derive`, and load only folders you trust."
-        )
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value if isinstance(value, list) else ()):
-        _check_texts(item, f"{place}.{key!r:.40}" if isinstance(value, dict) else place, source)
 
 
 def digest_of(document: Mapping[str, Any]) -> str:

@@ -78,34 +78,29 @@ class Option:
         if is_number(value) and hasattr(value, "item"):
             value = value.item()
         wanted = type_fault(name, kind.__name__ if isinstance(kind, type) else str(kind), value)
-        if wanted is not None:
+        if wanted is not None or (value is None and type(None) in get_args(kind)):
             return wanted
-        choices = self.choices or literals(kind)
-        if choices and (value is not None or type(None) not in get_args(kind)):
+        if choices := self.choices or literals(kind):
             several = is_of(kind, Sequence) and isinstance(value, Iterable) and not isinstance(value, str)
             wrong = [x for x in (value if several else [value]) if not isinstance(x, str) or x not in choices]
-            allowed, right = ", ".join(choices), not wrong
-            given = "" if right else f"{brief(wrong[0])} is none of the choices"
-        elif is_of(kind, tuple) and value is not None:
-            right = isinstance(value, Sequence) and len(value) == 2 and all(is_number(one) for one in value)
-            allowed, given = f"two numbers [{self.unit}]", f"{brief(value)} was given"
-        elif kind in (int, int | None) and isinstance(value, float):
-            allowed, right = self._allowed("whole number"), False
-            given = f"{value!r} is no whole number"
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
-            allowed = self._allowed(kind)
-            value = math.copysign(math.inf, value > 0 or -1) if abs(value) > sys.float_info.max else value
-            right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
-            given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
-        elif kind in (float, int, float | None, int | None) and not is_number(value):
-            if value is None and kind not in (float, int):
-                return None
-            allowed, right = self._allowed("number"), False
+            allowed = f"none of the choices. Allowed: {', '.join(choices)}."
+            return f"{name}: {brief(wrong[0])} is {allowed}" if wrong else None
+        if is_of(kind, tuple):
+            right = isinstance(value, Sequence) and len(value) == 2 and all(map(is_number, value))
+            return None if right else f"{name}: {brief(value)} was given. Allowed: two numbers [{self.unit}]."
+        whole = kind in (int, int | None)
+        if not is_number(value):
             given = f"{brief(value)} ({type(value).__name__}) is no number"
-        else:
+            numeric = whole or kind in (float, float | None)
+            return f"{name}: {given}. Allowed: {self._allowed('number')}." if numeric else None
+        if whole and isinstance(value, float):
+            return f"{name}: {value!r} is no whole number. Allowed: {self._allowed('whole number')}."
+        words = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
+        value = math.copysign(math.inf, value > 0 or -1) if abs(value) > sys.float_info.max else value
+        if self.least <= value <= self.most and value > self.above and math.isfinite(value):
             return None
-        return None if right else f"{name}: {given}. Allowed: {allowed}."
+        given = f"{value:g} {self.unit}".rstrip()
+        return f"{name}: {given} lies outside its bounds. Allowed: {self._allowed(words)}."
 
     def _allowed(self, kind: str) -> str:
         if self.most < math.inf:

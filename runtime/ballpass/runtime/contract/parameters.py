@@ -7,11 +7,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from numbers import Real
 
 import numpy as np
 
-from ballpass.runtime.contract.arguments import brief
+from ballpass.runtime.contract.arguments import brief, is_number
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest, ParameterInfo
@@ -185,14 +184,12 @@ def unchecked_numbers(
 
 def scalar(value: object) -> float | None:
     """`value` as float when it is one real number (NumPy's scalars and arrays of no dimension included), else None."""
-    if getattr(value, "shape", None) == () and hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, Real) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except OverflowError:  # an integer of more than 308 digits
-            return math.inf if abs(value) == value else -math.inf
-    return None
+    if not is_number(value):
+        return None
+    try:
+        return float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        return math.inf if value > 0 else -math.inf
 
 
 def said_unit(given: object) -> str:

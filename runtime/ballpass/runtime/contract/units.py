@@ -2,9 +2,9 @@
 
 In: a value of a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
 
-A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own.  Sizes of the
-usual units are here, equal to pint's.  A caller with more units, as `ballpass.derive` with pint's, gives a function
-that looks them up.
+A scene is data, so nothing in it is evaluated: the grammar below is a part of that of Python's expressions, of which
+only the tree is taken.  Sizes of the usual units are here, equal to pint's.  A caller with more units, as
+`ballpass.derive` with pint's, gives a function that looks them up.
 
 ::
 
@@ -21,9 +21,11 @@ silently loses a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7
 
 from __future__ import annotations
 
+import ast
 import math
 import re
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -145,12 +147,11 @@ def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> f
         what = "a truth value" if isinstance(given, bool) else _type_name(given)
         raise refuse(f"{what} instead of {kind}", f"write {_quoted(example, unit)}")
     if not isinstance(given, str):
-        value = _plain_number(given)
-        if value is None:
+        if not abs(given) <= sys.float_info.max:
             raise refuse("the number is not finite", "give a finite number")
         if unit != "1":
             raise refuse("the unit is missing", f'write the number as text with its unit, "{show(given)} <unit>"')
-        return value
+        return float(given)
 
     text = given.strip().replace("\u2212", "-")  # the minus sign of printed tables
     if len(text) > MAX_LENGTH:
@@ -217,125 +218,70 @@ def _show_inner(given: object) -> str:
 @lru_cache(maxsize=512)
 def unit_size(text: str, look_up: LookUp | None = None) -> UnitSize:
     """Size of the unit written as `text`; the empty text is "1"."""
-    tokens: list[tuple[str, str]] = []
-    position = 0
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        if match is None or match.lastgroup is None:
+    if len(text) > MAX_LENGTH:
+        raise GrammarError(f"a text of {len(text)} characters is no unit", f"use at most {MAX_LENGTH} characters")
+    names: list[str] = []
+    words: list[str] = []
+    for match in _TOKEN.finditer(text):
+        if match.lastgroup == "stray":
             raise GrammarError(
-                f"the character {show(text[position])} has no place in a unit",
+                f"the character {show(match.group())} has no place in a unit",
                 'write units with names, "*", "/" and "^", as in "N*s/m" or "N/m^1.5"',
             )
-        tokens.append((match.lastgroup, match.group()))
-        position = match.end()
-    reader = _UnitReader(tokens=[t for t in tokens if t[0] != "blank"], look_up=look_up or unknown_unit)
-    return reader.read()
+        if match.lastgroup == "name":  # numbered, for Python has words that are units: in
+            words.append(f"n{len(names)}")
+            names.append(match.group())
+        elif match.lastgroup == "sign":
+            words.append(_SIGNS.get(match.group(), match.group()))
+    product = re.sub(r"(?<=[\w)]) (?=[n(])", " * ", " ".join(words))
+    # "250 /s" is a quotient; any other sign behind the number makes a computation of it, as a factor 0 does
+    product = {"/": "1 ", "*": "0 ", "+": "0 ", "-": "0 "}.get(product[:1], "") + product
+    try:
+        return _size_of(ast.parse(product or "1", mode="eval").body, names, look_up or unknown_unit)
+    except SyntaxError:
+        raise GrammarError(
+            f"{show(text)} has a place where no unit can go on",
+            'write units with names, "*", "/" and "^", as in "kg*m^2/s"',
+        ) from None
 
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3}(?![0-9]))?")
 _TOKEN = re.compile(
-    r"(?P<blank>[ \t]+)|(?P<name>[^\W\d²³][^\W²³]*|[%°])|(?P<number>[0-9]+(?:\.[0-9]+)?)"
-    r"|(?P<power>\*\*|\^)|(?P<times>[*·⋅])|(?P<over>/)|(?P<open>\()|(?P<close>\))|(?P<sign>[+-])|(?P<raised>[²³])"
+    r"(?P<name>[^\W\d²³][^\W²³]*|[%°])|(?P<sign>[0-9]+(?:\.[0-9]+)?|\*\*|[*·⋅/^²³()+-])|[ \t]+|(?P<stray>.)", re.DOTALL
 )
-_RAISED = {"²": Fraction(2), "³": Fraction(3)}
+#: What Python writes for signs of a unit.
+_SIGNS = {"·": "*", "⋅": "*", "^": "**", "²": "**2", "³": "**3"}
+_COMPUTATION = ("this is a computation, which is not done here", "write the result: one number and its unit")
 
 
-@dataclass(slots=True, kw_only=True)
-class _UnitReader:
-    """Recursive descent over the tokens of one unit; depth is bounded by the length of a quantity's text."""
+def _size_of(unit: ast.expr, names: Sequence[str], look_up: LookUp) -> UnitSize:
+    """Size of a unit of which Python has read the grammar alone."""
+    match unit:
+        case ast.Constant(value=1):
+            return _size(Fraction(1), {})
+        case ast.Name(id=word):
+            name = names[int(word[1:])]
+            return COMMON[name] if name in COMMON else look_up(name)
+        case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
+            return _power(_size_of(base, names, look_up), _exponent(exponent))
+        case ast.BinOp(left=left, op=ast.Mult() | ast.Div() as sign, right=right):
+            first, second = (_size_of(factor, names, look_up) for factor in (left, right))
+            return _multiply(first, second, -1 if isinstance(sign, ast.Div) else 1)
+    raise GrammarError(*_COMPUTATION)
 
-    tokens: list[tuple[str, str]]
-    look_up: LookUp
-    index: int = 0
 
-    def read(self) -> UnitSize:
-        if not self.tokens:
-            return UnitSize(exact=Fraction(1), rounded=1.0, base=())
-        if self._peek() == "over":  # "250 /s"
-            self.tokens.insert(0, ("number", "1"))
-        size = self._product()
-        if self.index != len(self.tokens):
-            raise self._misplaced()
-        return size
-
-    def _peek(self) -> str:
-        return self.tokens[self.index][0] if self.index < len(self.tokens) else "end"
-
-    def _next(self) -> str:
-        self.index += 1
-        return self.tokens[self.index - 1][1]
-
-    def _misplaced(self) -> GrammarError:
-        first = self.index == 0
-        if self._peek() in ("sign", "power", *(("times",) if first else ("number",))):
-            return GrammarError(
-                f"{show(self.tokens[self.index][1])} makes this a computation, which is not done here",
-                "write the result: one number and its unit",
-            )
-        what = show(self.tokens[self.index][1]) if self.index < len(self.tokens) else "the end of the text"
-        return GrammarError(
-            f"{what} stands where no unit can go on", 'write units with names, "*", "/" and "^", as in "kg*m^2/s"'
-        )
-
-    def _product(self) -> UnitSize:
-        size = self._factor()
-        while (word := self._peek()) not in ("end", "close"):
-            if word in ("times", "over"):
-                self._next()
-            elif word not in ("name", "open"):
-                raise self._misplaced()
-            size = _multiply(size, self._factor(), -1 if word == "over" else 1)
-        return size
-
-    def _factor(self) -> UnitSize:
-        word = self._peek()
-        if word == "name":
-            name = self._next()
-            size = COMMON[name] if name in COMMON else self.look_up(name)
-        elif word == "number" and self.tokens[self.index][1] == "1":
-            self._next()
-            size = UnitSize(exact=Fraction(1), rounded=1.0, base=())
-        elif word == "open":
-            self._next()
-            size = self._product()
-            if self._peek() != "close":
-                raise self._misplaced()
-            self._next()
-        else:
-            raise self._misplaced()
-        if self._peek() == "power":
-            self._next()
-            return _power(size, self._exponent())
-        if self._peek() == "raised":
-            return _power(size, _RAISED[self._next()])
-        return size
-
-    def _exponent(self) -> Fraction:
-        enclosed = self._peek() == "open"
-        if enclosed:
-            self._next()
-        sign = -1 if self._peek() == "sign" and self._next() == "-" else 1
-        exponent = sign * self._decimal()
-        if enclosed:
-            if self._peek() == "over":
-                self._next()
-                divisor = self._decimal()
-                if divisor == 0:
-                    raise GrammarError("a power with the denominator 0", 'write the power as in "m^1.5" or "m^(3/2)"')
-                exponent /= divisor
-            if self._peek() != "close":
-                raise self._misplaced()
-            self._next()
-        if abs(exponent) > MAX_EXPONENT:
-            raise GrammarError(
-                "the power of a unit is too large", f"use powers between -{MAX_EXPONENT} and {MAX_EXPONENT}"
-            )
-        return exponent
-
-    def _decimal(self) -> Fraction:
-        if self._peek() != "number":
-            raise self._misplaced()
-        return Fraction(self._next())
+def _exponent(written: ast.expr) -> Fraction:
+    match written:
+        case ast.Constant(value=number):
+            return Fraction(str(number))
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=rest):
+            return _exponent(rest) * (-1 if isinstance(sign, ast.USub) else 1)
+        case ast.BinOp(left=above, op=ast.Div(), right=below):
+            divisor = _exponent(below)
+            if divisor == 0:
+                raise GrammarError("a power with the denominator 0", 'write the power as in "m^1.5" or "m^(3/2)"')
+            return _exponent(above) / divisor
+    raise GrammarError(*_COMPUTATION)
 
 
 def _multiply(left: UnitSize, right: UnitSize, sign: int) -> UnitSize:
@@ -350,6 +296,8 @@ def _multiply(left: UnitSize, right: UnitSize, sign: int) -> UnitSize:
 
 
 def _power(size: UnitSize, exponent: Fraction) -> UnitSize:
+    if abs(exponent) > MAX_EXPONENT:
+        raise GrammarError("the power of a unit is too large", f"use powers between -{MAX_EXPONENT} and {MAX_EXPONENT}")
     base = tuple((name, power * exponent) for name, power in size.base if exponent)
     try:
         if exponent.denominator == 1:
@@ -423,30 +371,19 @@ def _dimension_fault(
     if not rest:
         return "the unit is missing", f'add the unit, as in "{example}"'
     problem = f'the unit "{show(rest).strip(chr(34))}" has the wrong dimension for {kind}'
-    without_angle = [item for item in size.base if item[0] != "radian"]
-    if without_angle == [item for item in target.base if item[0] != "radian"]:
-        if unit == "rad/s":
-            return (
-                problem,
-                f'cycles per second are not rad/s: write "rpm", "rad/s" or "turn/s" instead of "{rest}"',
-            )
-        if unit == "Hz":
-            return problem, f'a frequency counts cycles: write "Hz" or "1/s" instead of "{rest}"'
-        if unit == "rad":
-            return problem, 'write the angle in "deg" or "rad"'
+    of_angles = {
+        "rad/s": f'cycles per second are not rad/s: write "rpm", "rad/s" or "turn/s" instead of "{rest}"',
+        "Hz": f'a frequency counts cycles: write "Hz" or "1/s" instead of "{rest}"',
+        "rad": 'write the angle in "deg" or "rad"',
+    }
+    first, second = ([item for item in one.base if item[0] != "radian"] for one in (size, target))
+    if first == second and unit in of_angles:
+        return problem, of_angles[unit]
     if unit == "1":
         return problem, "leave out the unit"
     if rest in ("Nm", "kNm"):
         return problem, f'write products with "*": "{rest[:-1]}*m"'
     return problem, f'use a unit as in "{example}" (SI: {unit})'
-
-
-def _plain_number(given: float) -> float | None:
-    try:
-        value = float(given)
-    except OverflowError:  # an integer of more than 308 digits
-        return None
-    return value if math.isfinite(value) else None
 
 
 def _quoted(example: str, unit: str) -> str:

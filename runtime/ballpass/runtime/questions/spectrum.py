@@ -529,18 +529,7 @@ def _recorded(
         cycle_length=1.0 / abs(turns) if turns else None,
         transient_cycles=0.0,
         manifest=model.manifest,
-        statistics=Statistics(
-            method="recording",
-            reason=str(path),
-            rtol=0.0,
-            magnitudes=(),
-            steps=None,
-            rejected=None,
-            segments=0,
-            calls=0,
-            wall_time=0.0,
-            compiled=False,
-        ),
+        statistics=Statistics(method="recording", reason=str(path), rtol=0.0),
         status=Status.DONE,
     )
     layout = f" ({file.layout})" if file.layout else ""

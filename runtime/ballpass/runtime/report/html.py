@@ -17,7 +17,7 @@ def to_html(report: Report) -> str:
 def table_html(table: ReportTable) -> str:
     """A table with its title and caption."""
     rows = [[_cell(cell) for cell in (*row, *[""] * (len(table.heads) - len(row)))] for row in table.rows]
-    shown = html.table_of_html(table.heads, rows, [head in table.right for head in table.heads])
+    shown = html.table_of_html(table.heads, rows, table.right)
     title = html.title(table.title) if table.title else ""
     return title + shown + (html.paragraph(table.caption) if table.caption else "")
 

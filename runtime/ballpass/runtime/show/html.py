@@ -46,14 +46,12 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, right: Coll
     rows : of cells, shown as ``str`` shows them
     right : heads of the columns that are aligned to the right
     """
-    return table_of_html(
-        heads, ([escape(str(cell)) for cell in row] for row in rows), [head in right for head in heads]
-    )
+    return table_of_html(heads, ([escape(str(cell)) for cell in row] for row in rows), right)
 
 
-def table_of_html(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[bool]) -> str:
+def table_of_html(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Collection[str]) -> str:
     """A table of cells that are HTML."""
-    looks = [' class="number"' if numbers else "" for numbers in right]
+    looks = [' class="number"' if name in right else "" for name in heads]
     head = "".join(f'<th scope="col"{look}>{escape(name)}</th>' for look, name in zip(looks, heads, strict=True))
     body = "".join(
         f"<tr>{''.join(f'<td{look}>{cell}</td>' for look, cell in zip(looks, row, strict=True))}</tr>" for row in rows

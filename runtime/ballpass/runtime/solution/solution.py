@@ -69,13 +69,13 @@ class Statistics:
     method: str
     reason: str
     rtol: float
-    magnitudes: tuple[float, ...]
-    steps: int | None
-    rejected: int | None
-    segments: int
-    calls: int
-    wall_time: float
-    compiled: bool
+    magnitudes: tuple[float, ...] = ()
+    steps: int | None = None
+    rejected: int | None = None
+    segments: int = 0
+    calls: int = 0
+    wall_time: float = 0.0
+    compiled: bool = False
     kinks: str | None = None
     located: int | None = None
     initial: tuple[float, ...] | None = None

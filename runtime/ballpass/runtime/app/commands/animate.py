@@ -74,16 +74,16 @@ def animate(
             from ballpass.runtime.plot.animate import count_pictures
 
             count_pictures(f".{format_}", last, pictures)  # impossible requests: refused before the simulation
-        asked = read_asked(scene, set_, cycles, duration, transient)
+        source, overrides = read_asked(scene, set_, cycles, duration, transient)
         path = results_file(out, scene, f"animation.{format_}", MOVING)
         unknown = partial(refuse_unknown, options_in({"bearing": Shown}), {"bearing": bearing})
-        model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
+        model = load_model(scene, stages, source.run.method, None, rtol, integrated=source.integrated, inspect=unknown)
         stages("simulating")
         solution = model.simulate(
             cycles=cycles,
             duration=duration,
             transient=transient,
-            parameters=asked.overrides,
+            parameters=overrides,
             rtol=rtol,
             progress=stages.fraction,
         )

@@ -17,9 +17,9 @@ import typer
 from typer.core import TyperArgument, TyperCommand
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
+from ballpass.runtime.app.commands.load_scene import read_asked, read_value
 from ballpass.runtime.app.commands.messages import complain, note, show_files, show_json, warn
-from ballpass.runtime.app.commands.shared import Stages, can_draw, check_folder, command, load_model, name_of
+from ballpass.runtime.app.commands.shared import Stages, check_folder, command, figure_formats, load_model, name_of
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file
@@ -325,10 +325,8 @@ def _place(
     question: Question, scene: Path, out: Path | None, format_: list[str] | None, *, figures: bool
 ) -> tuple[Path | None, tuple[str, ...]]:
     """Folder of the files, None where none are written, and formats of the figures."""
-    formats = read_formats(format_)
     folder = Path("results") / name_of(scene) if out is None and question.always else out
-    if folder is None or not figures or not can_draw():
-        formats = ()
+    formats = figure_formats(format_, wanted=figures and folder is not None)
     if folder is None or (question.always and not formats):
         return None, ()
     kinds = (*formats, *(("nc", "csv") if question.files else ()))
@@ -347,9 +345,9 @@ def _source(
         if set_:
             raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")
         return load_solution(scene), {}
-    asked = read_asked(scene, set_, *(values.get(name) for name in LENGTH if LENGTH[0] in values))
-    question.refuse_scene(integrated=asked.integrated, bearings=asked.bearings)
-    method = (values.get("method") or asked.method) if question.runs else ""
+    source, overrides = read_asked(scene, set_, *(values.get(name) for name in LENGTH if LENGTH[0] in values))
+    question.refuse_scene(integrated=source.integrated, bearings=bool(source.bearings))
+    method = (values.get("method") or source.run.method) if question.runs else ""
     needs = "" if question.samples or not question.runs else f"ballpass {question.name}"
     model = load_model(
         scene,
@@ -357,11 +355,11 @@ def _source(
         method,
         None,
         values.get("rtol"),
-        asked=asked,
+        integrated=source.integrated,
         needs=needs,
         inspect=partial(refuse_unknown, options_of(ask), values),
     )
-    return model, asked.overrides
+    return model, overrides
 
 
 def _progress(stages: Stages) -> Callable[..., None]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import asked_of, read_with_settings
+from ballpass.runtime.app.commands.load_scene import read_with_settings
 from ballpass.runtime.app.commands.messages import show_json
 from ballpass.runtime.app.commands.shared import command, load_model
 from ballpass.runtime.ratings.elements import element_words
@@ -41,7 +41,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     with command(scene) as stages:
         stages("reading the scene")
         read, _, overrides = read_with_settings(scene, set_)
-        model = load_model(scene, stages, "cvodes", asked=asked_of(read, overrides))
+        model = load_model(scene, stages, "cvodes", integrated=read.integrated)
         from ballpass.derive.features import cost
 
         stages("counting operations")
@@ -85,7 +85,6 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
     def worded(text: str) -> str:
         return element_words(text, [bearing.element for bearing in scene.bearings])
 
-    never = [*map(worded, _NEVER)]
     return {
         "scene": scene.name,
         "mechanism": scene.mechanism is not None,
@@ -93,7 +92,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "file": str(path),
         "files_of_columns": list(scene.notes),
         "modelled": parts,
-        "not_modelled": [*_absent(scene), *never, *_of_drive(scene)],
+        "not_modelled": [*_absent(scene), *map(worded, _NEVER), *_of_drive(scene)],
         "functions": {f.name: {"operations": f.operations, "what": worded(f.description)} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
         **said.to_json(),

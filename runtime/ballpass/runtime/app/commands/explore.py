@@ -36,11 +36,11 @@ def explore(scene: options.SceneOrFolder, out: options.ResultsFile = None) -> No
 
         stages("reading the scene")
         check_compiler()
-        asked = read_asked(scene, None)
+        source, _ = read_asked(scene, None)
         path = results_file(out, scene, "explore.html", ("html",))
-        over_time = scene.is_file() and not asked.integrated
-        with speed_over_time(scene, stages) if over_time else nullcontext(scene) as source:
-            model = load_model(source, stages, asked.method, asked=asked)
+        over_time = scene.is_file() and not source.integrated
+        with speed_over_time(scene, stages) if over_time else nullcontext(scene) as place:
+            model = load_model(place, stages, source.run.method, integrated=source.integrated)
             stages("compile for pages")
             path.parent.mkdir(parents=True, exist_ok=True)
             model.explore(path, units={} if scene.is_dir() else scene_units(scene, model.manifest))

@@ -80,7 +80,7 @@ def export(
 
             need_compiler("ballpass export --fmu")
         chosen = tuple(inputs or ())
-        over_time = scene.is_file() and not read_asked(scene, None).integrated
+        over_time = scene.is_file() and not read_asked(scene, None)[0].integrated
         if over_time:
             chosen = (*chosen, SPEED) if fmu else chosen
             note(

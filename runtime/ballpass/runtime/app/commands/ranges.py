@@ -57,6 +57,7 @@ def read_ranges(
             continue
         seen[path] = text
         try:
+            refuse_run_setting("--vary", path)
             if isinstance(source, Manifest):
                 found.append(parameter_range(source.parameters, "--vary", text, counted=True))
             else:
@@ -84,7 +85,6 @@ def _range_of_scene(scene: Scene, text: str) -> ParameterRange:
     path, _, written = (part.strip() for part in text.partition("="))
     name, *rest = (part.strip() for part in written.split(":"))
     try:
-        refuse_run_setting(path)
         check_path(scene, path)
         group = clearance_of_group(scene, path, name)
     except SceneError as error:
@@ -92,18 +92,10 @@ def _range_of_scene(scene: Scene, text: str) -> ParameterRange:
     if group is not None and len(rest) == 1:
         least, _, most = (f"{1e6 * end:.12g} um" for end in group)
         text = f"{path}={least}:{most}:{rest[0]}"
-    parameters = [
-        ParameterInfo(
-            name=one.path,
-            unit=one.unit,
-            description=one.description,
-            latex=one.latex,
-            default=one.value,
-            **(asdict(one.limits.bounds) if one.limits.bounds is not None else {}),
-        )
-        for one in scene.quantities
-    ]
-    return parameter_range(parameters, "--vary", text, counted=True, parse=parse_quantity)
+    one = next(number for number in scene.quantities if number.path == path)
+    bounds = asdict(one.limits.bounds) if one.limits.bounds is not None else {}
+    info = ParameterInfo(name=path, unit=one.unit, description=one.description, latex="", default=one.value, **bounds)
+    return parameter_range([info], "--vary", text, counted=True, parse=parse_quantity)
 
 
 def grid(ranges: Sequence[ParameterRange]) -> dict[str, np.ndarray]:

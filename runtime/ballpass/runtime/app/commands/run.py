@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import read_asked, read_formats
+from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.messages import note, show_files, show_json, show_parts, size_words, warn
-from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder
+from ballpass.runtime.app.commands.shared import Stages, command, figure_formats, load_model, results_folder
 from ballpass.runtime.app.repeated import repeated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.method_registry import CHOICE, OWN, STEPPERS
@@ -136,32 +136,32 @@ def run(
         from ballpass.runtime.request.locating import LOCATED, refuse_with_error
 
         stages("reading the scene")
-        formats = read_formats(format_)
         refuse_with_error(error, method=method, rtol=rtol, kinks=kinks)
         start = _read_start(initial)
         # the transient of a run that goes on counts from the start of the first
-        asked = read_asked(scene, set_, cycles, duration, transient if initial in (None, "equilibrium") else 0.0)
+        counted = transient if initial in (None, "equilibrium") else 0.0
+        source, overrides = read_asked(scene, set_, cycles, duration, counted)
         for flag in (flag for flag, value in (("--error", error), ("--turns", turns)) if value is not None):
-            refuse_still(flag, integrated=asked.integrated)
+            refuse_still(flag, integrated=source.integrated)
         if initial == "equilibrium":
-            refuse_without_bearings("--initial equilibrium", bearings=asked.bearings)
-        figures = figures and can_draw()
-        names = (SOLUTION, SUMMARY, CAPTIONS, *(f"*.{kind}" for kind in formats if figures))
+            refuse_without_bearings("--initial equilibrium", bearings=bool(source.bearings))
+        formats = figure_formats(format_, wanted=figures)
+        names = (SOLUTION, SUMMARY, CAPTIONS, *(f"*.{kind}" for kind in formats))
         folder = results_folder(out, scene, *names)
         needs = next((flag for flag, given in (("--error", error), ("--of", of), ("--turns", turns)) if given), "")
         model = load_model(
             scene,
             stages,
-            method or asked.method,
+            method or source.run.method,
             kinks,
             rtol,
-            asked=asked,
+            integrated=source.integrated,
             needs=needs and f"ballpass run {needs}",
             inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
         )
         stages("simulating")
         length: dict[str, Any] = {"cycles": cycles, "duration": duration, "transient": transient}
-        given: dict[str, Any] = {"parameters": asked.overrides, "initial": start, "sample_rate": sample_rate}
+        given: dict[str, Any] = {"parameters": overrides, "initial": start, "sample_rate": sample_rate}
         first: dict[str, Any] = {"method": method, "rtol": rtol, "kinks": kinks}
         if error is not None:
             first |= {"error": error, "of": of}
@@ -194,13 +194,11 @@ def run(
         for words in report.warnings:
             warn(words)
         if chosen:
-            for words in tables_left_out(model, model.numbers(asked.overrides).values):
+            for words in tables_left_out(model, model.numbers(overrides).values):
                 warn(words)
         stages("writing results")
         kept = solution.steady() if chosen else solution
-        summary, files = _write_results(
-            model, solution, summary, folder, stages, formats=formats if figures else (), stored=kept
-        )
+        summary, files = _write_results(model, solution, summary, folder, stages, formats=formats, stored=kept)
     if json_:
         show_json(summary)
         return

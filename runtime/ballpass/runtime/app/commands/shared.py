@@ -29,10 +29,10 @@ from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 from ballpass.runtime.contract.folder import ForeignFolderError, read_manifest
 from ballpass.runtime.contract.folders import nearest
 from ballpass.runtime.contract.plugins import place_of
+from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
-    from ballpass.runtime.app.commands.load_scene import Asked
     from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.model import Model
 
@@ -178,13 +178,18 @@ def name_of(scene: Path) -> str:
     return scene.resolve().name if scene.is_dir() else scene.stem
 
 
-def can_draw() -> bool:
-    """Whether figures can be drawn; a message names the missing package where they cannot."""
+def figure_formats(given: Sequence[str] | None, *, wanted: bool) -> tuple[str, ...]:
+    """Kinds of the figures, each once, the first one where none was named; none where no figures are wanted.
+
+    A message names the missing package where they cannot be drawn.
+    """
+    if not wanted:
+        return ()
     for package in ("matplotlib", "scipy"):
         if not is_installed(package):
             note(f"No figures are drawn. {missing(package)}")
-            return False
-    return True
+            return ()
+    return tuple(dict.fromkeys(given or FORMATS[:1]))
 
 
 def results_folder(out: Path | None, scene: Path, *names: str) -> Path:
@@ -269,7 +274,7 @@ def load_model(
     kinks: str | None = None,
     rtol: float | None = None,
     *,
-    asked: Asked,
+    integrated: bool,
     needs: str = "",
     inspect: Callable[[Manifest], None] | None = None,
 ) -> Model:
@@ -277,7 +282,7 @@ def load_model(
 
     Parameters
     ----------
-    asked : of the scene
+    integrated : whether the scene has states
     needs : command that works with the stepper alone: where there is no compiler it is refused before anything is
         derived; empty for others.  A scene without states needs no stepper
     inspect : see `read_own`: refuses names that the model does not have
@@ -287,7 +292,7 @@ def load_model(
     from ballpass.runtime.native.compilers import need_compiler
     from ballpass.runtime.request.locating import choose_kinks, stepper_for
 
-    if asked.integrated and (needs or method in STEPPERS):
+    if integrated and (needs or method in STEPPERS):
         need_compiler(needs or f"method {method}")
 
     def compiled(folder: Path, own: bool) -> Model:

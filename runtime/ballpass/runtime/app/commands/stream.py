@@ -37,16 +37,16 @@ def stream(
     """Simulate into a file, piece by piece, for any length; ballpass spectrum and ballpass run --initial read it."""
     with command(scene) as stages:
         stages("reading the scene")
-        asked = read_asked(scene, set_, cycles, duration, 0.0)
+        source, overrides = read_asked(scene, set_, cycles, duration, 0.0)
         unknown = partial(refuse_unknown, options_in({"of": Of}), {"of": of})
-        model = load_model(scene, stages, asked.method, None, rtol, asked=asked, inspect=unknown)
+        model = load_model(scene, stages, source.run.method, None, rtol, integrated=source.integrated, inspect=unknown)
         stages("simulating")
         statistics = model.stream(
             out,
             sample_rate=sample_rate,
             cycles=cycles,
             duration=duration,
-            parameters=asked.overrides,
+            parameters=overrides,
             rtol=rtol,
             outputs=of,
             progress=stages.fraction,

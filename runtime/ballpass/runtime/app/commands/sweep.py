@@ -14,20 +14,17 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.load_scene import asked_of, read_asked, read_formats, read_with_settings
+from ballpass.runtime.app.commands.load_scene import read_asked, read_with_settings
 from ballpass.runtime.app.commands.messages import complain, note, show, show_files, show_json, show_parts, warn
-from ballpass.runtime.app.commands.shared import can_draw, command, load_model, results_folder
+from ballpass.runtime.app.commands.shared import command, figure_formats, load_model, results_folder
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.folder import read_manifest
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient, options_in, refuse_unknown
 from ballpass.runtime.plot import on_paper
 from ballpass.runtime.questions import option_names
 
 if TYPE_CHECKING:
-    from ballpass.derive import Scene
     from ballpass.runtime.app.commands.sweep_results import Sweep
-    from ballpass.runtime.contract.manifest import Manifest
     from ballpass.runtime.request.locating import Kinks
 
 Of = Annotated[
@@ -122,16 +119,15 @@ def sweep(
 
     with command(scene) as stages, on_paper(width_, titles=titles_):
         stages("reading the scene")
-        source: Scene | Manifest
         # how many turns a duration is, members with other speeds decide
         length = (cycles, None, transient) if duration is None else ()
         if scene.is_dir():
-            source, overrides = read_manifest(scene), read_asked(scene, set_).overrides
+            source, overrides = read_asked(scene, set_)
         else:
             _, source, overrides = read_with_settings(scene, set_, *length)
         ranges = read_ranges(source, vary or [], overrides)
         folder = results_folder(out, scene, "sweep.*", "sweep_*")
-        figures, formats = figures and can_draw(), read_formats(format_)
+        formats = figure_formats(format_, wanted=figures)
         varied = grid(ranges)
         count = math.prod(one.count for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
@@ -140,7 +136,7 @@ def sweep(
                 scene,
                 stages,
                 "",
-                asked=asked_of(source, overrides),
+                integrated=source.integrated,
                 needs="ballpass sweep",
                 inspect=partial(refuse_unknown, options_in({"of": Of}), {"of": of}),
             )
@@ -173,8 +169,8 @@ def sweep(
                     model, {**overrides, **at}, cycles=cycles, duration=duration, transient=transient
                 ):
                     warn(f"{swept.place(member)}: {words}")
-        files = swept.write(folder, formats if figures else ())
-    if figures and len(ranges) > 2:
+        files = swept.write(folder, formats)
+    if formats and len(ranges) > 2:
         note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")
     if digits is None and count > TWINS:
         note(f"{count} members: none was run twice, and how many digits hold is not known; --digits does.")

@@ -16,7 +16,6 @@ import numpy as np
 
 from ballpass.runtime.ask.parameter_range import ParameterRange
 from ballpass.runtime.contract.folders import replace_files
-from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.units import printed_unit, table_unit
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.report.digits import SCATTER, shared_text
@@ -134,13 +133,8 @@ class Sweep:
             ],
             "set": dict(self.fixed),
             "quantities": {
-                name: {
-                    "unit": self.unit(name),
-                    "values": finite(values.tolist()),
-                    **(
-                        {"uncertainty": finite(result.uncertainty[name].tolist())} if name in result.uncertainty else {}
-                    ),
-                }
+                name: {"unit": self.unit(name), "values": values.tolist()}
+                | ({"uncertainty": result.uncertainty[name].tolist()} if name in result.uncertainty else {})
                 for name, values in result.observables.items()
             },
             "failures": [
