@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Balance, Mesh
+from ballpass.derive.mechanism.balance import Balance, JointAction
 from ballpass.derive.mechanism.dyads.dyad import Group, Margin, Placement, name_acceleration, name_hinge, name_rate
 from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, body_point, joint_point, name_turn, place
 from ballpass.derive.mechanism.vectors import Pair, add, cross, dot, quarter_turn, rotate, scale, subtract
@@ -161,7 +161,7 @@ class GearPair(Group):
             margin=Margin(joint=hinge.name, expression=apart, description=words),
         )
 
-    def meshing(self, placement: Placement) -> Mesh:
+    def meshing(self, placement: Placement) -> JointAction:
         """The gear in balances: a force that drives along the tangent and pushes the wheels apart; of a belt the pull
         of the strand that carries, where it leaves the pulleys."""
         (along,), (first, second), across = placement.spans, self.radii, quarter_turn(placement.spans[0])
@@ -176,7 +176,7 @@ class GearPair(Group):
             normal = subtract(scale(cosine, along), scale(sine, across))
         size = sp.Symbol(f"gear.{self.gear.name}.tangential", real=True)
         shifts = scale(first, normal), scale(second, normal)
-        return Mesh(joint=self.mesh, size=size, direction=direction, shifts=shifts)
+        return JointAction(joint=self.mesh, along=((size, direction),), shifts=shifts)
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
         """Teeth: moment of the wheel about its axis; then the hinge."""

@@ -17,7 +17,7 @@ import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.assembly import assemble
-from ballpass.derive.mechanism.balance import Mesh
+from ballpass.derive.mechanism.balance import JointAction
 from ballpass.derive.mechanism.dyads import Group, Margin, Placement
 from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import (
@@ -101,7 +101,7 @@ class Linkage:
         return (*self.mechanism.joints, *(mesh.joint for mesh in self.meshes))
 
     @property
-    def meshes(self) -> tuple[Mesh, ...]:
+    def meshes(self) -> tuple[JointAction, ...]:
         """Contacts that are no joints of the mechanism."""
         return tuple(mesh for p in self.placements if (mesh := p.dyad.meshing(p)) is not None)
 

@@ -84,7 +84,6 @@ class PRP(Dyad):
         return Placement(
             dyad=self,
             poses=(first, second),
-            spans=(),
             determinant=determinant,
             guides=tuple(
                 Guide(joint=guide, host=host.body, slider=body, direction=direction, travel=travel)

@@ -83,7 +83,6 @@ class RPP(Dyad):
                 place(ledger, mechanism, block, host, pin, hinge),
                 place(ledger, mechanism, yoke, host, foot, anchor),
             ),
-            spans=(),
             determinant=determinant,
             guides=(
                 Guide(joint=slot, host=yoke, slider=block, direction=along, travel=travels[0]),
