@@ -125,21 +125,11 @@ class System:
     @property
     def states(self) -> tuple[Variable, ...]:
         """Positions, then velocities."""
-        positions = (
-            Variable(name=c.name, symbol=c.position, unit=c.unit, description=c.words[0], latex=c.latex)
-            for c in self.coordinates
-        )
-        velocities = (
-            Variable(
-                name=c.velocity.name,
-                symbol=c.velocity,
-                unit=c.velocity_unit,
-                description=c.words[1],
-                latex=rf"\dot {c.latex}",
-            )
-            for c in self.coordinates
-        )
-        return (*positions, *velocities)
+        rows = [(c.name, c.position, c.unit, c.words[0], c.latex) for c in self.coordinates]
+        rows += [
+            (c.velocity.name, c.velocity, c.velocity_unit, c.words[1], rf"\dot {c.latex}") for c in self.coordinates
+        ]
+        return tuple(Variable(name=n, symbol=s, unit=u, description=d, latex=tex) for n, s, u, d, tex in rows)
 
 
 @typed

@@ -184,7 +184,7 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
     inner, outer = rings
     known = drive if isinstance(drive, KnownDrive) else None
     evenly = known is not None and inner.swing == outer.swing == 0
-    steady = evenly and drive.even and bearing.coupling == "one-way"
+    steady = known is not None and known.even and evenly and bearing.coupling == "one-way"
     around, relative = inner.turns - outer.turns, inner.rate - outer.rate
     apart = inner.swing - inner.at_start - outer.swing + outer.at_start
     constants, share = [_ratio(bearing, names)], cage_ratio(names)

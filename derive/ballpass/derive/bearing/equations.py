@@ -22,11 +22,10 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, names_of, refuse_kinks, symbol_of
 from ballpass.derive.variables import Coordinate
-
-Pair = tuple[sp.Expr, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +91,6 @@ class RingMotion:
     """Equations of motion ``mass * acceleration = forcing`` of a bearing's rings."""
 
     constants: tuple[Definition, ...]
-    load: Pair
     mass: sp.ImmutableMatrix
     forcing: sp.ImmutableMatrix
 
@@ -336,7 +334,6 @@ def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: s
     words = "Mass moved by the inner ring, Eq. (3) or given"
     return RingMotion(
         constants=(model.names.define(moved, inner_mass, "kg", words, "m_{ei}"),),
-        load=load,
         mass=mass,
         forcing=sp.ImmutableMatrix(forcing),
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.mechanism.kinematics import Ledger
+from ballpass.derive.mechanism.kinematics import Ledger, Motion
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import Coordinate
 
@@ -27,6 +27,12 @@ class Inertia:
     amount: sp.Expr
     rate: sp.Expr
     acceleration: sp.Expr
+
+
+def inertias_of(mass: sp.Expr, moving: Motion) -> list[Inertia]:
+    """A mass that moves in the plane, or an inertia whose rates are pairs."""
+    rates = zip(moving.velocity, moving.acceleration, strict=True)
+    return [Inertia(amount=mass, rate=rate, acceleration=acceleration) for rate, acceleration in rates]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

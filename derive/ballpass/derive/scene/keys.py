@@ -335,12 +335,9 @@ class WholeKey(Key):
         """The number."""
         if isinstance(given, int) and not isinstance(given, bool) and self.lowest <= given <= self.highest:
             return given
-        allowed, remedy = (
-            f"a whole number from {self.lowest} to {self.highest}",
-            f"write for example {name} = {self.sample}",
-        )
-        self.refuse(table, name, "this is not a whole number within the bounds", given, allowed, remedy)
-        return self.lowest
+        allowed = f"a whole number from {self.lowest} to {self.highest}"
+        remedy = f"write for example {name} = {self.sample}"
+        return int(self.refuse(table, name, "this is not a whole number within the bounds", given, allowed, remedy))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
