@@ -35,7 +35,7 @@ from ballpass.derive.mechanism.linear_forms import Effort, EquationsOfMotion, In
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
 from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, weights_of, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.mechanism.swing import STILL, Swing, swing_of, with_driver
+from ballpass.derive.mechanism.swing import STILL, Swing, swing_of
 from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.requested import (
@@ -247,7 +247,7 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
     linkage, forces, reactions = None, NO_FORCES, None
     axis = rigid_shaft(bearings, scene.shaft, mechanism)
     if mechanism is None:
-        turning = with_driver(drive)
+        turning = Swing(turns=sp.S.One, rate=drive.speed)
         on_shaft = (turning, STILL)
         if scene.shaft is not None and scene.shaft.ring == "outer":
             on_shaft = (STILL, turning)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage_slip import excess_slip, kept_share, lag_at_rows, lag_coordinate, lag_names
+from ballpass.derive.bearing.cage_slip import excess_slip, lag_at_rows, lag_coordinate, lag_names
 from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
@@ -287,7 +287,8 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
 
 def _slipping(bearing: Bearing, names: Names, *, about_inner: bool) -> Definition:
     """Share of the inner ring's speed in that of a cage that lags: seen from the ring that stands, or the outer one."""
-    kept = kept_share(bearing)
+    assert bearing.cage is not None  # it slips
+    kept = 1 - symbol_of(bearing.cage.slip or bearing.cage.slips[-1])
     share = 1 - kept * (1 - cage_ratio(names)) if about_inner else kept * cage_ratio(names)
     words = "Share of the inner ring's speed in that of the cage, slip included"
     return names.define(names.constant("cage_share"), share, "1", words, r"\kappa_c")

@@ -74,11 +74,6 @@ class LinearForms:
         self._biases: dict[sp.Symbol, sp.Expr] = {}
         self._ledger = Ledger()
 
-    @property
-    def definitions(self) -> tuple[Definition, ...]:
-        """What has been named so far."""
-        return self._ledger.definitions
-
     def columns(self, rate: sp.Expr) -> tuple[sp.Expr, ...]:
         """Derivatives of a velocity by the generalized velocities."""
         found = [sp.S.Zero] * len(self._coordinates)
@@ -173,4 +168,5 @@ class LinearForms:
                 f"f_{{{symbols[i]}}}",
             )
         full = sp.ImmutableMatrix(size, size, lambda i, j: mass[max(i, j)][min(i, j)])
-        return EquationsOfMotion(mass=full, forcing=sp.ImmutableMatrix(size, 1, forcing), definitions=self.definitions)
+        forces, named = sp.ImmutableMatrix(size, 1, forcing), self._ledger.definitions
+        return EquationsOfMotion(mass=full, forcing=forces, definitions=named)
