@@ -17,7 +17,6 @@ import sympy as sp
 from ballpass.derive.bearing.cage import Cage, cage_of
 from ballpass.derive.bearing.equations import (
     BearingModel,
-    RingMotion,
     derive_bearing,
     own_coordinates,
     ring_coordinates,
@@ -194,7 +193,7 @@ class _Parts:
     models: tuple[BearingModel, ...]
     own: RingLoad
     loads: tuple[Pair | None, ...]
-    motions: tuple[RingMotion, ...]
+    motions: tuple[EquationsOfMotion, ...]
     coupled: tuple[Coupled, ...]
     axis: RigidShaft | None
     on_axis: tuple[Coupled, ...]
@@ -425,7 +424,7 @@ def _system(parts: _Parts, errors: list[SceneError]) -> System:
             *drive.constants,
             *(c for swing in parts.swings for c in swing.constants),
             *(c for model in models for c in model.constants),
-            *(c for motion in parts.motions for c in motion.constants),
+            *(c for motion in parts.motions for c in motion.definitions),
             *(*forces.constants, *parts.own.constants),
             *dict.fromkeys(c for o in named for c in o.constants),
         ),

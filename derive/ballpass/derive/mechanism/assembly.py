@@ -53,10 +53,7 @@ def _check_mobility(mechanism: Mechanism) -> None:
     unknowns, equations = 3 * bodies, 2 * joints + gears
     if unknowns - equations == 1:
         return
-    if unknowns - equations < 1:
-        remedy = "remove a joint or add a body: each joint takes two degrees of freedom, each body brings three"
-    else:
-        remedy = "add a joint or remove a body: each joint takes two degrees of freedom, each body brings three"
+    change = "remove a joint or add a body" if unknowns - equations < 1 else "add a joint or remove a body"
     raise Fault(
         key="mechanism.joints",
         problem=(
@@ -69,7 +66,7 @@ def _check_mobility(mechanism: Mechanism) -> None:
             f"joints {_listed([j.name for j in mechanism.joints])}"
         ),
         allowed="mobility 1: one unknown more than equations, which the driver prescribes",
-        remedy=remedy,
+        remedy=f"{change}: each joint takes two degrees of freedom, each body brings three",
     ).of_linkage()
 
 
