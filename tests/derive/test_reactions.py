@@ -245,9 +245,3 @@ def test_rod_without_inertia_is_refused():
     machine = four_bar().with_body("rocker", inertia=None)
     with pytest.raises(LinkageError, match=r"moment balance of rocker"):
         machine.reactions(machine.linkage())
-
-
-def test_moment_of_a_revolute_joint_is_refused():
-    machine = offset_slider()
-    with pytest.raises(LinkageError, match="guide moment of joint B"):
-        machine.reactions(machine.linkage(), moments=("B",))

@@ -7,7 +7,7 @@
 
 Nothing flows back.  `ballpass.runtime` reads the folder and never imports this package.
 
-Names are imported when first used: reading a scene, or finding that its folder is fresh, does not import SymPy.
+Names are imported when first used: finding that the folder of a scene is fresh does not import SymPy.
 """
 
 from __future__ import annotations

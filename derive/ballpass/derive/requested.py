@@ -17,12 +17,13 @@ from ballpass.derive.bearing.elements import ELEMENTS
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
-from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
+from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.mechanism.vectors import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.outputs import made, named_rings
 from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Output, Words
 
@@ -184,15 +185,10 @@ def bearing_power_outputs(bearing: Bearing, model: BearingModel, load: Pair | No
         # in a linkage with play the damper turns with the housing
         seen = moving if one_way else subtract(moving, scale(turning, quarter_turn(out)))
         loss = count * damping * dot(seen, seen)
-        spring = -count * stiffness * dot(out, moving)
+        spring, stored = -count * stiffness * dot(out, moving), count * stiffness * dot(out, out) / 2
         rows = [
             ("housing.power", spring - loss, "W", f"Power of the housing's spring and damper{of}"),
-            (
-                "housing.energy",
-                count * stiffness * dot(out, out) / 2,
-                "J",
-                f"Potential energy of the housing's spring{of}",
-            ),
+            ("housing.energy", stored, "J", f"Potential energy of the housing's spring{of}"),
             ("housing.loss", loss, "W", f"Power loss of the housing's damper{of}"),
         ]
     force = ball.ring_force  # of the inner ring on the balls

@@ -17,7 +17,6 @@ import sympy as sp
 from ballpass.derive.bearing.cage import Cage, cage_of
 from ballpass.derive.bearing.equations import (
     BearingModel,
-    RingMotion,
     derive_bearing,
     own_coordinates,
     ring_coordinates,
@@ -35,7 +34,7 @@ from ballpass.derive.mechanism.linear_forms import Effort, EquationsOfMotion, In
 from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
 from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, weights_of, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.mechanism.swing import STILL, Swing, swing_of, with_driver
+from ballpass.derive.mechanism.swing import STILL, Swing, swing_of
 from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.requested import (
@@ -125,21 +124,11 @@ class System:
     @property
     def states(self) -> tuple[Variable, ...]:
         """Positions, then velocities."""
-        positions = (
-            Variable(name=c.name, symbol=c.position, unit=c.unit, description=c.words[0], latex=c.latex)
-            for c in self.coordinates
-        )
-        velocities = (
-            Variable(
-                name=c.velocity.name,
-                symbol=c.velocity,
-                unit=c.velocity_unit,
-                description=c.words[1],
-                latex=rf"\dot {c.latex}",
-            )
-            for c in self.coordinates
-        )
-        return (*positions, *velocities)
+        rows = [(c.name, c.position, c.unit, c.words[0], c.latex) for c in self.coordinates]
+        rows += [
+            (c.velocity.name, c.velocity, c.velocity_unit, c.words[1], rf"\dot {c.latex}") for c in self.coordinates
+        ]
+        return tuple(Variable(name=n, symbol=s, unit=u, description=d, latex=tex) for n, s, u, d, tex in rows)
 
 
 @typed
@@ -204,7 +193,7 @@ class _Parts:
     models: tuple[BearingModel, ...]
     own: RingLoad
     loads: tuple[Pair | None, ...]
-    motions: tuple[RingMotion, ...]
+    motions: tuple[EquationsOfMotion, ...]
     coupled: tuple[Coupled, ...]
     axis: RigidShaft | None
     on_axis: tuple[Coupled, ...]
@@ -257,7 +246,7 @@ def _parts(scene: Scene, errors: list[SceneError]) -> _Parts | None:
     linkage, forces, reactions = None, NO_FORCES, None
     axis = rigid_shaft(bearings, scene.shaft, mechanism)
     if mechanism is None:
-        turning = with_driver(drive)
+        turning = Swing(turns=sp.S.One, rate=drive.speed)
         on_shaft = (turning, STILL)
         if scene.shaft is not None and scene.shaft.ring == "outer":
             on_shaft = (STILL, turning)
@@ -435,7 +424,7 @@ def _system(parts: _Parts, errors: list[SceneError]) -> System:
             *drive.constants,
             *(c for swing in parts.swings for c in swing.constants),
             *(c for model in models for c in model.constants),
-            *(c for motion in parts.motions for c in motion.constants),
+            *(c for motion in parts.motions for c in motion.definitions),
             *(*forces.constants, *parts.own.constants),
             *dict.fromkeys(c for o in named for c in o.constants),
         ),

@@ -15,7 +15,7 @@ import sympy as sp
 
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.quantity import SceneNumber, Vector
-from ballpass.derive.scene.table import listing
+from ballpass.derive.scene.table import listing, upright
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.elements import element_words
 
@@ -119,9 +119,8 @@ def names_of(bearing: Bearing) -> Names:
     return Names(prefix=bearing.prefix, path=bearing.path, element=bearing.element)
 
 
-def subscript(name: str) -> str:
-    """A scene name as an upright LaTeX subscript."""
-    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+#: A scene name as an upright LaTeX subscript.
+subscript = upright
 
 
 def symbol_of(quantity: SceneNumber) -> sp.Symbol:

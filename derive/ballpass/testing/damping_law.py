@@ -139,18 +139,14 @@ def _slopes(contact: ca.Function, force: Force, p: np.ndarray, c: np.ndarray) ->
     value = contact(delta, rate, p, c)[1]
     slopes = ca.Function("slopes", [delta, rate], [ca.gradient(value, ca.vertcat(delta, rate))])
     for d, v in _points():
-        found = np.array(slopes(d, v)).ravel()
-        steps = 1e-4 * abs(d), 1e-4 * abs(v)
-        for k, (along, words) in enumerate((((1, 0), "deflection"), ((0, 1), "rate"))):
-            h = steps[k]
-            ends = [force(d + s * h * along[0], v + s * h * along[1]) for s in (-2, -1, 1, 2)]
+        steps = (1e-4 * abs(d), 0.0), (0.0, 1e-4 * abs(v))
+        for found, (a, b), words in zip(np.array(slopes(d, v)).ravel(), steps, ("deflection", "rate"), strict=True):
+            ends, h = [force(d + s * a, v + s * b) for s in (-2, -1, 1, 2)], a + b
             difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * h)
-            size = max(abs(difference), abs(found[k]), 1e-6 * max(map(abs, ends)) / h)
-            if abs(found[k] - difference) > _SLOPE * size:
-                yield (
-                    f"its slope by the {words} is {found[k]:.6g} at deflection {d:g} m and rate {v:g} m/s, and by "
-                    + (f"differences {difference:.6g}")
-                )
+            size = max(abs(difference), abs(found), 1e-6 * max(map(abs, ends)) / h)
+            if abs(found - difference) > _SLOPE * size:
+                place = f"at deflection {d:g} m and rate {v:g} m/s"
+                yield f"its slope by the {words} is {found:.6g} {place}, and by differences {difference:.6g}"
                 return
 
 

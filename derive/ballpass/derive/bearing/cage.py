@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage_slip import excess_slip, kept_share, lag_at_rows, lag_coordinate, lag_names
+from ballpass.derive.bearing.cage_slip import excess_slip, lag_at_rows, lag_coordinate, lag_names
 from ballpass.derive.bearing.contact_direction import ball_turns, contact_cosine
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.effects.effect import Passing
@@ -184,7 +184,7 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
     inner, outer = rings
     known = drive if isinstance(drive, KnownDrive) else None
     evenly = known is not None and inner.swing == outer.swing == 0
-    steady = evenly and drive.even and bearing.coupling == "one-way"
+    steady = known is not None and known.even and evenly and bearing.coupling == "one-way"
     around, relative = inner.turns - outer.turns, inner.rate - outer.rate
     apart = inner.swing - inner.at_start - outer.swing + outer.at_start
     constants, share = [_ratio(bearing, names)], cage_ratio(names)
@@ -287,7 +287,8 @@ def cage_of(bearing: Bearing, rings: tuple[Swing, Swing], drive: Drive) -> Cage:
 
 def _slipping(bearing: Bearing, names: Names, *, about_inner: bool) -> Definition:
     """Share of the inner ring's speed in that of a cage that lags: seen from the ring that stands, or the outer one."""
-    kept = kept_share(bearing)
+    assert bearing.cage is not None  # it slips
+    kept = 1 - symbol_of(bearing.cage.slip or bearing.cage.slips[-1])
     share = 1 - kept * (1 - cage_ratio(names)) if about_inner else kept * cage_ratio(names)
     words = "Share of the inner ring's speed in that of the cage, slip included"
     return names.define(names.constant("cage_share"), share, "1", words, r"\kappa_c")

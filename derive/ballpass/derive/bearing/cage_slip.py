@@ -1,7 +1,7 @@
 """A cage whose slip changes over time: its lag behind a cage that has the slip of the last row.
 
-In: a bearing.  Out: the share of the rolling speed that the cage keeps in the end, its slip beyond that of the last
-row, and its lag: known before a run where the rings turn with a known driver, else a coordinate.
+In: a bearing.  Out: its slip beyond that of the last row, and its lag: known before a run where the rings turn with a
+known driver, else a coordinate.
 """
 
 from __future__ import annotations
@@ -12,13 +12,6 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Coordinate, Input
 from ballpass.runtime.contract.manifest import CAGE_EXCESS_SLIP
-
-
-def kept_share(bearing: Bearing) -> sp.Expr:
-    """Part of the rolling speed with which the cage turns, in the end."""
-    if bearing.cage is None or not bearing.cage.slipping:
-        return sp.S.One
-    return 1 - symbol_of(bearing.cage.slip or bearing.cage.slips[-1])
 
 
 def lag_names(bearing: Bearing, names: Names) -> tuple[sp.Symbol, ...]:

@@ -22,11 +22,11 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
+from ballpass.derive.mechanism.linear_forms import EquationsOfMotion
+from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, names_of, refuse_kinks, symbol_of
 from ballpass.derive.variables import Coordinate
-
-Pair = tuple[sp.Expr, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,16 +85,6 @@ class BearingModel:
     parting: Pair
     ball: BallRelations
     laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RingMotion:
-    """Equations of motion ``mass * acceleration = forcing`` of a bearing's rings."""
-
-    constants: tuple[Definition, ...]
-    load: Pair
-    mass: sp.ImmutableMatrix
-    forcing: sp.ImmutableMatrix
 
 
 def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
@@ -303,7 +293,7 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
     return own_terms(taken, axes, further, (cos, sin), names, cage.ring_rate) if taken != 0 else None
 
 
-def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: sp.Expr) -> RingMotion:
+def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: sp.Expr) -> EquationsOfMotion:
     """Lagrange's equations of the second kind for rings under a load, mass matrix and forcing apart, Eq. (2).
 
     Parameters
@@ -334,9 +324,5 @@ def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: s
         applied = load[k] if k < 2 else sp.S.Zero
         forcing.append(applied + contact - sp.diff(potential, q[k]) - sp.diff(dissipation, v[k]))
     words = "Mass moved by the inner ring, Eq. (3) or given"
-    return RingMotion(
-        constants=(model.names.define(moved, inner_mass, "kg", words, "m_{ei}"),),
-        load=load,
-        mass=mass,
-        forcing=sp.ImmutableMatrix(forcing),
-    )
+    constants = (model.names.define(moved, inner_mass, "kg", words, "m_{ei}"),)
+    return EquationsOfMotion(mass=mass, forcing=sp.ImmutableMatrix(forcing), definitions=constants)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from ballpass.derive.mechanism.vectors import dot, subtract
 from ballpass.derive.scene.bearing_records import Bearing, EquivalentMass
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Mechanism
@@ -30,13 +31,8 @@ def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
     assert mechanism is not None  # the reader refuses Eq. (3) without a mechanism
     assert bearing.joint is not None
     joint = mechanism.joint(bearing.joint)
-    side = 1 if joint.bodies[0] == FRAME else 0
-    crank = mechanism.body(joint.bodies[side])
-    ends = [
-        j.points[j.bodies.index(crank.name)]
-        for j in mechanism.joints
-        if j.name != joint.name and crank.name in j.bodies
-    ]
+    crank = mechanism.body(joint.other(FRAME))
+    ends = [j.point(crank.name) for j in mechanism.joints if j is not joint and crank.name in j.bodies]
     if len(ends) != 1:
         raise Fault(
             key=f"{bearing.path}.inner_ring.equivalent_mass",
@@ -45,10 +41,8 @@ def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
             allowed="a crank with exactly two joints",
             remedy=f'give the mass itself: [{bearing.path}.inner_ring] mass = "0.4 kg"',
         ).error()
-    near, far = components(crank.point(joint.points[side])), components(crank.point(ends[0]))
-    center = components(crank.center_of_mass)
-    arm = (far[0] - near[0], far[1] - near[1])
-    rest = (far[0] - center[0], far[1] - center[1])
-    lever = sp.cancel((rest[0] * arm[0] + rest[1] * arm[1]) / (arm[0] ** 2 + arm[1] ** 2))
+    near, far = (components(crank.point(name)) for name in (joint.point(crank.name), ends[0]))
+    arm, rest = subtract(far, near), subtract(far, components(crank.center_of_mass))
+    lever = sp.cancel(dot(rest, arm) / dot(arm, arm))
     share = sp.Rational(1, 2) if given.crank == "half" else sp.S.One
     return symbol_of(given.ring) + share * symbol_of(crank.mass) * lever + symbol_of(given.crankpin) / 2

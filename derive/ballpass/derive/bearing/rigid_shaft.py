@@ -19,7 +19,7 @@ from ballpass.derive.bearing.equations import ring_coordinates
 from ballpass.derive.bearing.ring_load import RingLoad
 from ballpass.derive.bearing.two_way import Coupled, ring
 from ballpass.derive.mechanism.kinematics import Ledger, Motion, displaced
-from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia, inertias_of
 from ballpass.derive.mechanism.vectors import add, dot, scale
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Mechanism
@@ -53,8 +53,7 @@ class RigidShaft:
     @property
     def tilting(self) -> tuple[Inertia, ...]:
         """Inertia of the tilts."""
-        rows = zip(self.slope.velocity, self.slope.acceleration, strict=True)
-        return tuple(Inertia(amount=self.transverse_inertia, rate=v, acceleration=a) for v, a in rows)
+        return tuple(inertias_of(self.transverse_inertia, self.slope))
 
     def gyroscopic(self, speed: sp.Expr) -> tuple[Effort, ...]:
         """Moments of a rotor that turns at a speed [rad/s], which do no work."""
@@ -64,11 +63,7 @@ class RigidShaft:
 
     def loaded(self, load: RingLoad, speed: sp.Expr) -> Coupled:
         """What a shaft adds that is loaded one-way; its own inertia is not that of a linkage's body."""
-        center = displaced(self.reference, self.slope, self.center_of_mass)
-        own = (
-            Inertia(amount=self.mass, rate=v, acceleration=a)
-            for v, a in zip(center.velocity, center.acceleration, strict=True)
-        )
+        own = inertias_of(self.mass, displaced(self.reference, self.slope, self.center_of_mass))
         pairs = ((load.force, self.reference.velocity), (load.moment, self.slope.velocity))
         work = (Effort(amount=f, rate=v) for pair in pairs for f, v in zip(*pair, strict=True) if f != 0)
         return Coupled(inertias=(*own, *self.tilting), efforts=(*work, *self.gyroscopic(speed)))

@@ -101,20 +101,10 @@ def lever_of(bearing: Bearing, bearings: Iterable[Bearing]) -> Lever | None:
     other = next(one for one in bearings if one.position is not None and one is not bearing)
     assert other.position is not None  # the reader refuses any but two
     here, there = symbol_of(bearing.position), symbol_of(other.position)
-    share = Definition(
-        symbol=sp.Symbol(f"{bearing.path}.share", real=True),
-        expression=there / (there - here),
-        unit="1",
-        description="Share of the force in the plane z = 0 that the bearing carries by levers",
-        latex="s",
-    )
-    per_moment = Definition(
-        symbol=sp.Symbol(f"{bearing.path}.lever_per_moment", real=True),
-        expression=1 / (there - here),
-        unit="1/m",
-        description="Force on the bearing for a force times its place along the shaft",
-        latex="s_M",
-    )
+    words = "Share of the force in the plane z = 0 that the bearing carries by levers"
+    share = defined(f"{bearing.path}.share", there / (there - here), "1", words, "s")
+    words = "Force on the bearing for a force times its place along the shaft"
+    per_moment = defined(f"{bearing.path}.lever_per_moment", 1 / (there - here), "1/m", words, "s_M")
     return Lever(share=share.symbol, per_moment=per_moment.symbol, constants=(share, per_moment))
 
 
@@ -125,25 +115,19 @@ def own_loads(scene: Scene, drive: Drive) -> RingLoad:
     ----------
     drive : of the shaft, whose angle some follow; beside a mechanism the reader refuses these
     """
-    return _sum(_placed(load, _windowed(load, _unwindowed(load, drive), drive)) for load in scene.loads)
+    parts = [_placed(load, _windowed(load, _unwindowed(load, drive), drive)) for load in scene.loads]
+    return RingLoad(
+        force=add(*(part.force for part in parts)),
+        moment=add(*(part.moment for part in parts)),
+        inputs=tuple(i for part in parts for i in part.inputs),
+        constants=tuple(c for part in parts for c in part.constants),
+        definitions=tuple(d for part in parts for d in part.definitions),
+    )
 
 
 def _placed(load: Load, full: RingLoad) -> RingLoad:
     """The load with its moment about the plane z = 0."""
     return full if load.position is None else replace(full, moment=scale(symbol_of(load.position), full.force))
-
-
-def _sum(parts: Iterable[RingLoad]) -> RingLoad:
-    total = RingLoad(force=(sp.S.Zero, sp.S.Zero))
-    for part in parts:
-        total = RingLoad(
-            force=add(total.force, part.force),
-            moment=add(total.moment, part.moment),
-            inputs=(*total.inputs, *part.inputs),
-            constants=(*total.constants, *part.constants),
-            definitions=(*total.definitions, *part.definitions),
-        )
-    return total
 
 
 def _unwindowed(load: Load, shaft: Drive) -> RingLoad:

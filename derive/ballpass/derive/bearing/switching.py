@@ -74,14 +74,11 @@ class Switching:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _SwitchPlace:
+    at: tuple[bool, sp.Expr]  # whether the rate decides, else the deflection; the value at which it does
     order: float  # power of the distance with which the branches differ
     above: bool  # whether the condition holds above the place; else below it
     ends_above: bool
     ends_below: bool
-
-    @property
-    def kink(self) -> bool:
-        return self.order <= KINK_ORDER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,10 +94,8 @@ def smoothness_of(force: sp.Expr, deflection: sp.Symbol, rate: sp.Symbol) -> Law
     """How often a force may be differentiated, found at each of its case distinctions."""
     orders = {False: math.inf, True: math.inf}
     for condition in sp.ordered(force.atoms(Relational)):
-        of_rate, start, _ = _border(condition, deflection, rate)
-        decides, other = (rate, deflection) if of_rate else (deflection, rate)
-        order = _look(force, condition, decides, start, other, above=True, paired=False).order
-        orders[of_rate] = min(orders[of_rate], order)
+        place = _look(force, condition, deflection, rate, pairs=False)
+        orders[place.at[0]] = min(orders[place.at[0]], place.order)
     return LawSmoothness(
         in_deflection=_in_words(orders[False]),
         in_rate=_in_words(orders[True]),
@@ -129,19 +124,12 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
         A condition is not of the form deflection or rate against a constant of the run.
     """
     found: dict[tuple[bool, sp.Expr], list[_SwitchPlace]] = {}
-    held: list[dict[sp.Basic, tuple[tuple[bool, sp.Expr], _SwitchPlace]]] = []
+    kinks: list[dict[Relational, _SwitchPlace]] = []
     for part in parts:
-        borders: dict[sp.Basic, tuple[tuple[bool, sp.Expr], _SwitchPlace]] = {}
-        for condition in sp.ordered(part.atoms(Relational)):
-            of_rate, start, above = _border(condition, deflection, rate)
-            decides, other = (rate, deflection) if of_rate else (deflection, rate)
-            paired = pairs and of_rate and start == 0 and deflection not in part.free_symbols
-            place = _look(part, condition, decides, start, other, above=above, paired=paired)
-            if not place.kink:
-                continue
-            found.setdefault((of_rate, start), []).append(place)
-            borders[condition] = (of_rate, start), place
-        held.append(borders)
+        places = {c: _look(part, c, deflection, rate, pairs=pairs) for c in sp.ordered(part.atoms(Relational))}
+        kinks.append({c: place for c, place in places.items() if place.order <= KINK_ORDER})
+        for place in kinks[-1].values():
+            found.setdefault(place.at, []).append(place)
     order = sorted(found, key=lambda key: (key[0], sp.default_sort_key(key[1])))
     names = {key: sp.Symbol(f"ball.border_{k}", real=True) for k, key in enumerate(order)}
     switches = tuple(
@@ -158,8 +146,8 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
     functions = dict(zip(order, (switch.function for switch in switches), strict=True))
     force = sum(
         (
-            part.xreplace({c: _held(functions[key], names[key], place) for c, (key, place) in borders.items()})
-            for part, borders in zip(parts, held, strict=True)
+            part.xreplace({c: _held(functions[place.at], names[place.at], place) for c, place in of_part.items()})
+            for part, of_part in zip(parts, kinks, strict=True)
         ),
         start=sp.S.Zero,
     )
@@ -192,25 +180,17 @@ def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tu
     )
 
 
-def _look(
-    part: sp.Expr,
-    condition: Relational,
-    decides: sp.Symbol,
-    start: sp.Expr,
-    other: sp.Symbol,
-    *,
-    above: bool,
-    paired: bool,
-) -> _SwitchPlace:
+def _look(part: sp.Expr, condition: Relational, deflection: sp.Symbol, rate: sp.Symbol, *, pairs: bool) -> _SwitchPlace:
     """How the two branches of a condition meet, tried with exact numbers little above one for everything else.
 
     A symbolic exponent is then one that is just above its least value, where a law is the least smooth.
 
     Parameters
     ----------
-    above : whether the condition holds above `start`
-    paired : whether an opposite ball has the same force with the opposite sign of what decides
+    pairs : whether an opposite ball has the same force with the opposite rate
     """
+    of_rate, start, above = _border(condition, deflection, rate)
+    decides, other = (rate, deflection) if of_rate else (deflection, rate)
     rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
     numbers = {symbol: 1 + sp.Rational(sp.prime(k + 10), 370) for k, symbol in enumerate(rest)}
     meets = start.xreplace(numbers)
@@ -223,12 +203,13 @@ def _look(
             # the other conditions are what they are there
             branches.append(piece.xreplace({c: c.xreplace({decides: meets}) for c in piece.atoms(Relational)}))
         difference = sp.sympify(branches[0] - branches[1])
-        if paired:
+        if pairs and of_rate and start == 0 and deflection not in part.free_symbols:
             difference += difference.xreplace({decides: -decides})
         least = min(least, _order(difference, decides, meets))
         ends_above = ends_above or not _is_real(branches[0], decides, meets)
         ends_below = ends_below or not _is_real(branches[1], decides, meets)
-    return _SwitchPlace(order=least, above=above, ends_above=ends_above, ends_below=ends_below)
+    at = of_rate, start
+    return _SwitchPlace(at=at, order=least, above=above, ends_above=ends_above, ends_below=ends_below)
 
 
 def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> tuple[list[mpmath.mpc], list[mpmath.mpc]]:

@@ -18,9 +18,9 @@ import sympy as sp
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import AT_REST, Motion, body_point, displaced
-from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia, inertias_of
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.mechanism.vectors import ZERO, Pair, add, cross, quarter_turn, scale, subtract
+from ballpass.derive.mechanism.vectors import ZERO, Pair, cross, quarter_turn, scale, subtract
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.mechanism_records import Joint
 from ballpass.derive.scene.table import FRAME
@@ -78,8 +78,7 @@ def on_tilting_shaft(bearing: Bearing, model: BearingModel) -> Coupled:
         outer, support = ring(model.coordinates, 2), bearing.outer
         efforts += _against(scale(symbol_of(support.stiffness), outer.position), outer.velocity)
         efforts += _against(scale(symbol_of(support.damping), outer.velocity), outer.velocity)
-        rates = zip(outer.velocity, outer.acceleration, strict=True)
-        inertias = [Inertia(amount=symbol_of(support.mass), rate=v, acceleration=a) for v, a in rates]
+        inertias = inertias_of(symbol_of(support.mass), outer)
     return Coupled(inertias=tuple(inertias), efforts=tuple(efforts))
 
 
@@ -115,16 +114,14 @@ def couple(bearing: Bearing, model: BearingModel, linkage: Linkage) -> Coupled:
         efforts += _against(scale(stiffness, outer.position), outer.velocity)
         efforts += _against(scale(damping, seen), seen)
         torques[1] += damping * cross(outer.position, seen)
-        velocity, acceleration = add(housing.velocity, outer.velocity), add(housing.acceleration, outer.acceleration)
-        inertias = [Inertia(amount=mass, rate=v, acceleration=a) for v, a in zip(velocity, acceleration, strict=True)]
+        centre = displaced(housing, outer, 1)
+        inertias = inertias_of(mass, centre)
         weight = ZERO if mechanism.gravity is None else scale(mass, components(mechanism.gravity, axis=(0, -1)))
-        places = add(housing.position, outer.position)
-        weights = [
-            Effort(amount=f, rate=v, place=r) for f, v, r in zip(weight, velocity, places, strict=True) if f != 0
-        ]
+        rows = zip(weight, centre.velocity, centre.position, strict=True)
+        weights = [Effort(amount=f, rate=v, place=r) for f, v, r in rows if f != 0]
         efforts += weights
         # the reaction is that of the housing: the inner ring's body feels it less what moves the outer ring
-        carried = subtract(weight, scale(mass, acceleration))
+        carried = subtract(weight, scale(mass, centre.acceleration))
     forces = (carried, ZERO)
     return Coupled(
         inertias=tuple(inertias),

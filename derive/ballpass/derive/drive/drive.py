@@ -72,11 +72,6 @@ class Drive(ABC):
         """Angle [rad], rate [rad/s] and angular acceleration [rad/s^2] of the driven body."""
         return (self.angle, self.speed, self.acceleration) if self.swings is None else self.swings
 
-    @property
-    def even(self) -> bool:
-        """Whether the speed is constant."""
-        return False
-
     @abstractmethod
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
         """1 while the angle lies in one of some windows, pairs of parameter names [rad], else 0."""

@@ -32,9 +32,6 @@ _TEXTS = {
     ca.OP_SIN: "bp_sin1({0})",
     ca.OP_COS: "bp_cos1({0})",
     ca.OP_TAN: "tan({0})",
-    ca.OP_ATAN: "atan({0})",
-    ca.OP_ASIN: "asin({0})",
-    ca.OP_ACOS: "acos({0})",
     ca.OP_EXP: "exp({0})",
     ca.OP_LOG: "log({0})",
     ca.OP_TANH: "tanh({0})",
@@ -52,8 +49,6 @@ _TEXTS = {
     ca.OP_FMAX: "fmax({0}, {1})",
     ca.OP_LT: "(double)({0} < {1})",
     ca.OP_LE: "(double)({0} <= {1})",
-    ca.OP_EQ: "(double)({0} == {1})",
-    ca.OP_NE: "(double)({0} != {1})",
     # of comparisons, 0 or 1; loops around && or || become no vectors
     ca.OP_AND: "(double)({0} * {1} != 0.0)",
     ca.OP_OR: "(double)({0} + {1} != 0.0)",
@@ -94,8 +89,8 @@ def print_function(
         An operation has no C text here, or a result is sparse.
     """
     by_value = scalars - varying if lanes else scalars
-    arguments = [_argument(function.name_in(k), by_value) for k in range(function.n_in())]
-    results = [f"double *restrict {function.name_out(k)}" for k in range(function.n_out())]
+    arguments = [f"double {n}" if n in by_value else f"const double *restrict {n}" for n in function.name_in()]
+    results = [f"double *restrict {n}" for n in function.name_out()]
     for k in range(function.n_out()):
         if not function.sparsity_out(k).is_dense():
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
@@ -123,9 +118,7 @@ def print_function(
     held: dict[int, str] = {}
     shared: set[str] = set()
     for k, (operation, out, take) in enumerate(steps):
-        if k in silent:
-            continue
-        if k in void:
+        if k in silent or k in void:
             continue
         if operation == ca.OP_OUTPUT:
             place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
@@ -221,10 +214,6 @@ def _shared_divisors(steps: Sequence[_Step]) -> dict[int, tuple[str, bool]]:
             made_by[out[0]] = k
     shared = [places for places in divisions.values() if len(places) > 1]
     return {k: (f"i{number}", k == places[0]) for number, places in enumerate(shared) for k in places}
-
-
-def _argument(name: str, by_value: frozenset[str]) -> str:
-    return f"double {name}" if name in by_value else f"const double *restrict {name}"
 
 
 def print_array(name: str, values: list[float]) -> str:

@@ -47,9 +47,9 @@ def describe(
         ),
         outputs=tuple(info_of(mf.VariableInfo, o, size=_size(system, o)) for o in system.outputs),
         quantities=tuple(
-            info_of(mf.QuantityInfo, o, size=_size(system, o), group=g.name)
-            for g in functions.groups
-            for o in g.outputs
+            info_of(mf.QuantityInfo, o, size=_size(system, o), group=name)
+            for name, outputs in functions.groups.items()
+            for o in outputs
         ),
         functions=tuple(
             mf.FunctionInfo(

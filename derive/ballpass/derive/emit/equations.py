@@ -6,7 +6,7 @@ In: a `System`.  Out: text; the same system gives the same bytes.  Browsers show
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import sympy as sp
 
@@ -33,25 +33,20 @@ _OPEN = ("Equations of motion",)
 _FORMULA, _PLACE = re.compile(r"\$\$\n(.*?)\n\$\$|\$([^$\n]+)\$", re.DOTALL), re.compile("\ue000(\\d+)\ue001")
 
 
-class _Printer:
-    """LaTeX of expressions in the model's symbols."""
+#: LaTeX of an expression in the model's symbols.
+_Tex = Callable[[sp.Basic], str]
 
-    def __init__(self, system: System) -> None:
-        names: dict[sp.Symbol, str] = {TIME: "t"}
-        named: tuple[Input | Variable, ...] = (*system.parameters, *system.inputs, *system.states)
-        names |= {n.symbol: n.latex for n in named}
-        definitions = [*system.constants, *system.definitions]
-        for bearing in system.bearings:
-            ball = bearing.ball
-            names |= {ball.cos: bearing.names.latex(r"\cos\theta_j"), ball.sin: bearing.names.latex(r"\sin\theta_j")}
-            definitions += [*ball.definitions, *ball.sums]
-        for definition in definitions:
-            names[definition.symbol] = definition.latex
-        self._names = names
 
-    def __call__(self, expression: sp.Basic) -> str:
-        kappa = sp.Function(r"\kappa")
-        return str(sp.latex(sp.sympify(expression).replace(ellipticity, kappa), symbol_names=self._names))
+def _printer(system: System) -> _Tex:
+    named: list[Input | Variable | Definition]
+    named = [*system.parameters, *system.inputs, *system.states, *system.constants, *system.definitions]
+    names, kappa = {TIME: "t"}, sp.Function(r"\kappa")
+    for bearing in system.bearings:
+        ball = bearing.ball
+        names |= {ball.cos: bearing.names.latex(r"\cos\theta_j"), ball.sin: bearing.names.latex(r"\sin\theta_j")}
+        named += [*ball.definitions, *ball.sums]
+    names |= {one.symbol: one.latex for one in named}
+    return lambda expression: str(sp.latex(sp.sympify(expression).replace(ellipticity, kappa), symbol_names=names))
 
 
 @typed
@@ -68,33 +63,26 @@ def equations(system: System, *, values: bool = True) -> str:
     >>> page.splitlines()[2]
     '# Derived equations: rotor'
     """
-    tex = _Printer(system)
-    numbers: list[tuple[str, ...]]
-    numbers = [(f"${p.latex}$", f"`{p.name}`", _unit(p.unit), p.description) for p in system.parameters]
-    if values:
-        numbers = [(*row[:2], f"{p.default:.7g}", *row[2:]) for row, p in zip(numbers, system.parameters, strict=True)]
+    tex = _printer(system)
     parts = [
         HEADER,
         f"# Derived equations: {system.scene.name}",
         "Frame: x right, y up, angles counter-clockwise from +x. SI units. Equation numbers are those of the paper.",
         *_table_of(
             "Parameters",
-            ("symbol", "name", *(["value"] if values else []), "unit", "meaning"),
-            numbers,
+            ("symbol", "name", *["value"] * values, "unit", "meaning"),
+            (
+                (f"${p.latex}$", f"`{p.name}`", *[f"{p.default:.7g}"] * values, _unit(p.unit), p.description)
+                for p in system.parameters
+            ),
         ),
     ]
-    if system.states:
-        parts += _table_of(
-            "States",
-            ("symbol", "name", "unit", "meaning"),
-            ((f"${s.latex}$", f"`{s.name}`", s.unit, s.description) for s in system.states),
-        )
-    if system.inputs:
-        parts += _table_of(
-            "Inputs, constant between breakpoints",
-            ("symbol", "name", "unit", "meaning"),
-            ((f"${i.latex}$", f"`{i.name}`", i.unit, i.description) for i in system.inputs),
-        )
+    tables: dict[str, Sequence[Input | Variable]]
+    tables = {"States": system.states, "Inputs, constant between breakpoints": system.inputs}
+    for title, items in tables.items():
+        if items:
+            rows = ((f"${item.latex}$", f"`{item.name}`", item.unit, item.description) for item in items)
+            parts += _table_of(title, ("symbol", "name", "unit", "meaning"), rows)
     if system.constants:
         parts += ["## Derived constants", "Evaluated once a run.", *_definitions(tex, system.constants)]
     if system.linkage is not None and system.reactions is not None:
@@ -129,7 +117,7 @@ def equations(system: System, *, values: bool = True) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _contact(tex: _Printer, model: BearingModel) -> list[str]:
+def _contact(tex: _Tex, model: BearingModel) -> list[str]:
     ball, name = model.ball, model.names.prefix[:-1]
     angle = model.names.latex(r"\theta_j")
     return [
@@ -142,7 +130,7 @@ def _contact(tex: _Printer, model: BearingModel) -> list[str]:
     ]
 
 
-def _motion(tex: _Printer, system: System) -> list[str]:
+def _motion(tex: _Tex, system: System) -> list[str]:
     parts = ["## Equations of motion" + ("" if system.linear_forms else ", Eq. (2)")]
     if system.linear_forms:
         parts += [
@@ -164,18 +152,18 @@ def _motion(tex: _Printer, system: System) -> list[str]:
     return [*parts, "## Smoothness of the laws", laws]
 
 
-def _definitions(tex: _Printer, definitions: Iterable[Definition]) -> list[str]:
+def _definitions(tex: _Tex, definitions: Iterable[Definition]) -> list[str]:
     return [_line(tex, d, tex(d.expression)) for d in definitions]
 
 
-def _line(tex: _Printer, definition: Definition, right: str) -> str:
+def _line(tex: _Tex, definition: Definition, right: str) -> str:
     words = f"{definition.description} [{_unit(definition.unit)}]"
     if right == definition.latex:  # a parameter itself, which has the same symbol
         return f"{words}: ${right}$ as given."
     return f"{words}\n\n" + _wrapped(definition.latex, right)
 
 
-def _linear_equations(tex: _Printer, matrix: sp.Matrix, unknowns: sp.Matrix, right: sp.Matrix) -> list[str]:
+def _linear_equations(tex: _Tex, matrix: sp.Matrix, unknowns: sp.Matrix, right: sp.Matrix) -> list[str]:
     """A system of equations; long entries get a name and follow below it."""
     named: list[str] = []
 

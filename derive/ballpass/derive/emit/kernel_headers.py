@@ -13,7 +13,7 @@ What bearings of one structure have alike is written once, named ``bp_<b>_...`` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import accumulate
 
 import casadi as ca
@@ -113,7 +113,9 @@ def _structure(index: int, alike: tuple[int, ...], bearings: tuple[BallKernels, 
         "SUMS": own.sums,
         "SLOPES": own.slopes,
         "PARTIALS": own.partials,
-        **_load_powers(life),
+        # exponent of the loads that damage a ring, a fraction
+        "TURNING": life.turning.numerator,
+        "TURNING_BY": life.turning.denominator,
     }
     angles = [sp.Rational(2 * j, own.balls) * sp.pi for j in range(own.balls)]
     taken = ["{" + (", ".join(str(place) for _, place in bearings[k].taken) or "0") + "}" for k in alike]
@@ -135,11 +137,6 @@ def _structure(index: int, alike: tuple[int, ...], bearings: tuple[BallKernels, 
             *(_of_balls(own.over_numbers[key], index, text) for key, text in words.items()),
         ]
     )
-
-
-def _load_powers(life: ElementLife) -> dict[str, int]:
-    """Exponent of the loads that damage a ring, a fraction."""
-    return {"TURNING": life.turning.numerator, "TURNING_BY": life.turning.denominator}
 
 
 def _of_balls(function: ca.Function, index: int, words: str) -> str:
@@ -240,20 +237,17 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
             parts.append(_moved(own.over_numbers["switches_moved"], f"bp_{index}_", "Switching functions of a ball"))
         else:
             parts.append(_WITHOUT_SWITCHES.format(b=index))
-    behind = len(flags["of_rate"])
-    places = [system.inputs.index(switch.border) for switch in system.switches]
-    if kernels.windows:
-        borders = [k for k in places if system.inputs[k].windows]
-        sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": behind}
-        _flag_borders(flags, len(borders))
-        of_driver = [int(s.angle == DRIVER_ANGLE) for s in system.switches if s.angle is not None]
-        parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders)]
-        parts += [_integers("bp_window_of_driver", of_driver), *map(_single, kernels.windows)]
-    if kernels.stops:
-        borders = [k for k in places if not system.inputs[k].windows]
-        sizes |= {"BP_STOPS": len(borders), "BP_FIRST_STOP": len(flags["of_rate"])}
-        _flag_borders(flags, len(borders))
-        parts += ["#define BP_HAS_STOPS", _integers("bp_stop_input", borders), *map(_single, kernels.stops)]
+    of_driver = [int(s.angle == DRIVER_ANGLE) for s in system.switches if s.angle is not None]
+    further = {"window": [_integers("bp_window_of_driver", of_driver)], "stop": list[str]()}
+    for kind, printed in (("window", kernels.windows), ("stop", kernels.stops)):
+        if printed:
+            of_kind = (s.border for s in system.switches if (s.angle is None) == (kind == "stop"))
+            borders = [system.inputs.index(border) for border in of_kind]
+            sizes |= {f"BP_{kind.upper()}S": len(borders), f"BP_FIRST_{kind.upper()}": len(flags["of_rate"])}
+            for key, listed in flags.items():  # no force ends there, and a rate comes with the switching function
+                listed += [float(key == "has_rate")] * len(borders)
+            parts += [f"#define BP_HAS_{kind.upper()}S", _integers(f"bp_{kind}_input", borders)]
+            parts += [*further[kind], *map(_single, printed)]
     if not flags["of_rate"]:
         return None
     tables = "\n".join(print_array(f"bp_{name}", values) for name, values in flags.items())
@@ -265,12 +259,6 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
         "   a rate comes with the switching function. */\n" + tables,
     ]
     return _header("SWITCHES", [*head, *parts])
-
-
-def _flag_borders(flags: Mapping[str, list[float]], count: int) -> None:
-    """Add borders of the motion: no force ends there, and a rate comes with the switching function."""
-    for key, listed in flags.items():
-        listed += [float(key == "has_rate")] * count
 
 
 def ensemble_header(kernels: Kernels) -> str:

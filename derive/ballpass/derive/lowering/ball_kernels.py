@@ -27,7 +27,7 @@ member_forces, member_slopes  the first two for ensembles: of opposite balls tog
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -298,14 +298,13 @@ class BallBuilder:
         over_numbers, taken = _over_numbers(own, len(takes))
         numbers = max(len(taken), 1)
         over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
-        over_numbers["moved"] = _along("moved", over_numbers["slopes"], slice(len(sums), None), "G_d")
+        over_numbers["moved"] = _moved("moved", over_numbers["slopes"], slice(len(sums), None), "G")
         if at["b"].numel():
             over_numbers["held_partials"] = _partials(
                 "held_partials", over_numbers["held_forces"], over_numbers["held_slopes"]
             )
-            over_numbers["switches_moved"] = _along(
-                "switches_moved", over_numbers["switches"], slice(at["g"].numel()), "g_d"
-            )
+            functions = slice(at["g"].numel())
+            over_numbers["switches_moved"] = _moved("switches_moved", over_numbers["switches"], functions, "g")
         partials = over_numbers["partials"].size1_out(0)
         over_numbers["sums_moved"] = self._sums_moved(partials, numbers, len(sums), len(slopes))
         return BallKernels(
@@ -342,7 +341,7 @@ def _is_smooth_in(value: ca.SX, symbol: ca.SX) -> bool:
 
 def _partials(name: str, forces: ca.Function, slopes: ca.Function) -> ca.Function:
     """The rows of `slopes`, and derivatives of those of `forces` by the ball's angle, by r0 and by k."""
-    given = {forces.name_in(k): ca.SX.sym(forces.name_in(k), forces.size1_in(k)) for k in range(forces.n_in())}
+    given = arguments_of(forces)
     sums = forces(*given.values())
     angled = ca.jtimes(sums, ca.vertcat(given["co"], given["si"]), ca.vertcat(-given["si"], given["co"]))
     by_r0, by_k = ca.jacobian(sums, given["r"])[:, 0], ca.jacobian(sums, given["k"])
@@ -350,13 +349,24 @@ def _partials(name: str, forces: ca.Function, slopes: ca.Function) -> ca.Functio
     return ca.Function(name, [*given.values()], rows, [*given], ["rows"])
 
 
-def _along(name: str, of: ca.Function, rows: slice, result: str) -> ca.Function:
+def _moved(name: str, of: ca.Function, rows: slice, result: str) -> ca.Function:
     """Derivative of rows of a function's first result along a direction of all its arguments."""
-    given = {of.name_in(k): ca.SX.sym(of.name_in(k), of.size1_in(k)) for k in range(of.n_in())}
+    given = arguments_of(of)
+    return moved_along(name, given, {result: of.call([*given.values()], True, False)[0][rows]})
+
+
+def moved_along(name: str, given: Mapping[str, ca.SX], values: Mapping[str, ca.SX]) -> ca.Function:
+    """Derivatives of values along a direction of all that is given, named ``x_d`` for ``x``."""
     along = {f"{n}_d": ca.SX.sym(f"{n}_d", v.numel()) for n, v in given.items()}
-    value = of.call([*given.values()], True, False)[0][rows]
-    moved = ca.densify(ca.jtimes(value, ca.vertcat(*given.values()), ca.vertcat(*along.values())))
-    return ca.Function(name, [*given.values(), *along.values()], ca.cse([moved]), [*given, *along], [result])
+    point, direction = ca.vertcat(*given.values()), ca.vertcat(*along.values())
+    moved = ca.cse([ca.densify(ca.jtimes(ca.vec(value), point, direction)) for value in values.values()])
+    names = [f"{n}_d" for n in values]
+    return ca.Function(name, [*given.values(), *along.values()], moved, [*given, *along], names)
+
+
+def arguments_of(function: ca.Function) -> dict[str, ca.SX]:
+    """Symbols of a function's arguments, by their names."""
+    return dict(zip(function.name_in(), function.sx_in(), strict=True))
 
 
 def _over_numbers(

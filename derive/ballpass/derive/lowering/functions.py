@@ -19,7 +19,7 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.lowering.jacobians import Described, Outputs, group_functions, partials, tangent
+from ballpass.derive.lowering.jacobians import Described, group_functions, partials, tangent
 from ballpass.derive.lowering.kernels import KernelBuilder, Kernels
 from ballpass.derive.lowering.mass_matrix import accelerations
 from ballpass.derive.lowering.visitor import Visitor
@@ -36,6 +36,9 @@ _EQUATIONS = ("rhs", "mass_matrix")
 #: A visitor for each ball of each bearing, by the bearing's prefix.
 Balls = dict[str, list[Visitor]]
 
+#: Quantities that are differentiated, by the name of the function that has them one below the other.
+Groups = dict[str, tuple[Output, ...]]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class LoweredFunctions(ShortRepr):
@@ -50,7 +53,7 @@ class LoweredFunctions(ShortRepr):
     functions: tuple[Described, ...]
     equations: tuple[Described, ...]
     jacobians: tuple[Described, ...]
-    groups: tuple[Outputs, ...]
+    groups: Groups
     kernels: Kernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
@@ -175,7 +178,16 @@ class _Lowering:
         for name, outputs in extra.items():
             bodies.append((name, {k: self.visit(e) for k, e in outputs.items()}, "asked for on the side"))
 
-        builder = self._kernel_builder()
+        builder = None  # no stepper where no coordinate moves
+        if system.coordinates:
+            builder = KernelBuilder(
+                system,
+                self.visit,
+                values=self._values,
+                definitions=definitions,
+                constant=self._fixed,
+                arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p},
+            )
         # whatever is hoisted must be known before the vector of constants is closed
         contacts = [self._contact(bearing) for bearing in system.bearings]
         c, once = self._constants()
@@ -203,7 +215,7 @@ class _Lowering:
             if name == "rhs":  # the choice of a method needs these two
                 equations += partials(name, "xdot", results["xdot"], arguments, "xt")
         rhs = bodies[0][1]["xdot"] if system.coordinates else None
-        groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ([], [])
+        groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ({}, [])
         named = [
             VariableInfo(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants
@@ -214,7 +226,7 @@ class _Lowering:
             functions=tuple(made),
             equations=tuple(equations),
             jacobians=tuple(jacobians),
-            groups=tuple(groups),
+            groups=groups,
             kernels=builder.kernels(c) if builder else None,
         )
 
@@ -228,19 +240,6 @@ class _Lowering:
             hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
         )
 
-    def _kernel_builder(self) -> KernelBuilder | None:
-        """The kernels of the stepper; None where no coordinate moves."""
-        if not self.system.coordinates:
-            return None
-        return KernelBuilder(
-            self.system,
-            self.visit,
-            values=self._values,
-            definitions=self._definitions,
-            constant=self._fixed,
-            arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p},
-        )
-
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""
         symbols = ca.vertcat(*self._named, *self._hoisted.values())
@@ -249,7 +248,7 @@ class _Lowering:
         )
         return ca.SX(symbols), ca.SX(values)
 
-    def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Outputs], list[Described]]:
+    def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[Groups, list[Described]]:
         """Derivatives of the right-hand side and of every quantity, also of those that no run reports.
 
         They use the constants there are and add none.
@@ -261,11 +260,11 @@ class _Lowering:
         if rhs is not None:
             made += [*partials("rhs", "xdot", rhs, arguments, "upc"), tangent("rhs", "xdot", rhs, arguments)]
         values = [*zip(system.quantities, self._values_of(system.quantities, balls, visit), strict=True)]
-        groups = []
+        groups: Groups = {}
         for name, moving in (("ring_quantities", True), ("load_quantities", False)):
             chosen = [(q, v) for q, v in values if _uses({q.name: v}, self.x) == moving]
             if chosen:
-                groups.append(Outputs(name=name, outputs=tuple(q for q, _ in chosen)))
+                groups[name] = tuple(q for q, _ in chosen)
                 made += group_functions(name, [v for _, v in chosen], arguments)
         if system.bearings:
             made += group_functions("static_forces", self._static_forces(visit), arguments)

@@ -16,11 +16,8 @@ The groups: ``rhs``; ``ring_quantities``, which depend on the rings' states; ``l
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
-
-from ballpass.derive.variables import Output
 
 Described = tuple[ca.Function, str]
 
@@ -34,14 +31,6 @@ _WORDS = {
 
 #: Ends of the names of derivatives.
 DERIVATIVES = (*(f"_jac_{key}" for key in _WORDS), "_tangent")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outputs:
-    """Quantities of one generated function: their names and sizes are those of `outputs`, in this order."""
-
-    name: str
-    outputs: tuple[Output, ...]
 
 
 def partials(

@@ -21,15 +21,15 @@ makes SIMD lanes of the loop over balls.  Text and compile time do not depend on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate
 
 import casadi as ca
 import sympy as sp
 from sympy.utilities.iterables import sift
 
-from ballpass.derive.lowering.ball_kernels import BallBuilder, BallKernels
+from ballpass.derive.lowering.ball_kernels import BallBuilder, BallKernels, arguments_of, moved_along
 from ballpass.derive.lowering.mass_matrix import accelerations
 from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
@@ -162,11 +162,11 @@ class KernelBuilder:
         relative = ca.vertcat(rings, *(self._of_state(symbol) for symbol in shared))
         g = ca.SX.sym("G", sum(b.slopes for b in self._balls))
         parts = [
-            _parts(v, sizes)
+            ca.vertsplit(v, [*accumulate(sizes, initial=0)])
             for v, sizes in (
                 (sums, counts),
                 (g, [b.slopes for b in self._balls]),
-                (held, [b.relative.numel() for b in self._balls]),
+                (held[: rings.numel()], [b.relative.numel() for b in self._balls]),
             )
         ]
         by_rings = ca.diagcat(*(b.by_relative(*of) for b, *of in zip(self._balls, *parts, strict=True)))
@@ -255,15 +255,12 @@ class KernelBuilder:
 
     def kernels(self, c: ca.SX) -> Kernels:
         """The functions, once the vector of derived constants is complete."""
-        functions = []
-        for name, takes, gives, words in self._bodies:
-            inputs = {**takes, **({"c": c} if "c" in takes else {})}
-            results = [ca.densify(v) for v in gives.values()]
-            function = ca.Function(name, [*inputs.values()], ca.cse(results), [*inputs], [*gives])
-            functions.append(Kernel(function=function, description=words))
+        functions = [
+            _kernel(name, {**takes, **({"c": c} if "c" in takes else {})}, gives, words)
+            for name, takes, gives, words in self._bodies
+        ]
         named = {k.function.name(): k for k in functions}
-        windows = self._of_windows(c) if self._windows else ()
-        tangents = tuple(_tangent(named[kernel], name, along, results) for name, kernel, along, results in _TANGENTS)
+        windows = self._of_switches("windows", self._windows, c)
         w = ca.vertcat(*self._stage.values())
         bearings = tuple(ball.kernels(c, self._arguments["p"], w) for ball in self._balls)
         angles, turned, stage_slopes, stage_moved = _turned(named["stage"].function)
@@ -276,15 +273,15 @@ class KernelBuilder:
             functions=(*functions, angles, _needed(named["stage"].function, named["relative"].function, bearings)),
             turned=turned,
             tangents=(
-                *tangents,
+                *(_tangent(named[name]) for name in _TANGENTS),
                 stage_moved,
-                *(_tangent(k, "windows_tangent", ("t", "x", "u", "p", "c"), ("g",)) for k in windows[:1]),
+                *(_tangent(kernel, ["g"]) for kernel in windows[:1]),
             ),
             stage_slopes=stage_slopes,
             bearings=bearings,
             structures=self._structures(bearings),
             windows=windows,
-            stops=self._of_stops(c) if self._stops else (),
+            stops=self._of_switches("stops", self._stops, c),
         )
 
     def _structures(self, bearings: Sequence[BallKernels]) -> tuple[tuple[int, ...], ...]:
@@ -293,49 +290,39 @@ class KernelBuilder:
             found.setdefault((scene.element, *kernels.structure), []).append(k)
         return tuple(map(tuple, found.values()))
 
-    def _of_windows(self, c: ca.SX) -> tuple[Kernel, Kernel, Kernel]:
+    def _of_switches(self, name: str, rows: Sequence[Sequence[ca.SX]], c: ca.SX) -> tuple[Kernel, ...]:
+        """Functions and rates of the rows, of windows angles and edges, and derivatives by the states; none of none."""
+        if not rows:
+            return ()
         takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
-        g, rate, *rest = (ca.densify(ca.vertcat(*column)) for column in zip(*self._windows, strict=True))
-        value = ca.Function("windows", [*takes.values()], ca.cse([g, rate]), [*takes], ["g", "rate"])
-        edges = ca.Function("window_edges", [*takes.values()], ca.cse(rest), [*takes], ["angle", "start", "end"])
-        slopes = ca.densify(ca.vec(ca.jacobian(rest[0], takes["x"]).T))
-        moved = ca.Function("windows_by_state", [*takes.values()], ca.cse([slopes]), [*takes], ["J"])
-        return (
-            Kernel(function=value, description="Switching functions of windows, and their rates"),
-            Kernel(function=edges, description="Angles of windows, and their edges"),
-            Kernel(function=moved, description="Derivatives of the angles of windows by the states"),
-        )
-
-    def _of_stops(self, c: ca.SX) -> tuple[Kernel, Kernel]:
-        takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
-        g, rate = (ca.densify(ca.vertcat(*column)) for column in zip(*self._stops, strict=True))
-        slopes = ca.densify(ca.vec(ca.jacobian(g, takes["x"]).T))
-        value = ca.Function("stops", [*takes.values()], ca.cse([g, rate]), [*takes], ["g", "rate"])
-        moved = ca.Function("stops_by_state", [*takes.values()], ca.cse([slopes]), [*takes], ["J"])
-        return (
-            Kernel(function=value, description="Switching functions of stops, and their rates"),
-            Kernel(function=moved, description="Derivatives of the switching functions of stops by the states"),
-        )
+        g, rate, *window = (ca.vertcat(*column) for column in zip(*rows, strict=True))
+        found = [_kernel(name, takes, {"g": g, "rate": rate}, f"Switching functions of {name}, and their rates")]
+        moving, words = g, "switching functions"
+        if window:
+            moving, words = window[0], "angles"
+            edges = dict(zip(("angle", "start", "end"), window, strict=True))
+            found.append(_kernel("window_edges", takes, edges, "Angles of windows, and their edges"))
+        slopes, words = ca.vec(ca.jacobian(moving, takes["x"]).T), f"Derivatives of the {words} of {name} by the states"
+        return (*found, _kernel(f"{name}_by_state", takes, {"J": slopes}, words))
 
 
-def _parts(vector: ca.SX, sizes: Sequence[int]) -> list[ca.SX]:
-    """Entries of a vector, part after part."""
-    ends = list(accumulate(sizes, initial=0))
-    return [vector[first:last] for first, last in pairwise(ends)]
+def _kernel(name: str, takes: Mapping[str, ca.SX], gives: Mapping[str, ca.SX], words: str) -> Kernel:
+    """A kernel with dense results that share their common subexpressions."""
+    results = ca.cse([ca.densify(ca.SX(value)) for value in gives.values()])
+    return Kernel(function=ca.Function(name, [*takes.values()], results, [*takes], [*gives]), description=words)
 
 
 def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:
     """``cage``: the stage variables that deflections need; the other entries of w are zero."""
-    arguments = [ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())]
-    w = stage(*arguments)
+    arguments = arguments_of(stage)
+    w = stage(*arguments.values())
     rows, columns = relative.jac_sparsity(0, relative.name_in().index("w")).get_triplet()
     deflecting = sum(bearing.relative for bearing in bearings)
     needed = {column for row, column in zip(rows, columns, strict=True) if row < deflecting}
     for bearing in bearings:
         needed |= {place for kind, place in bearing.taken if kind == "w"}
     kept = ca.vertcat(*(w[k] if k in needed else ca.SX(0.0) for k in range(w.numel())))
-    function = ca.Function("cage", arguments, [ca.densify(kept)], stage.name_in(), ["w"])
-    return Kernel(function=function, description="Stage of deflections")
+    return _kernel("cage", arguments, {"w": kept}, "Stage of deflections")
 
 
 def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Kernel]:
@@ -343,7 +330,7 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
 
     Sines and cosines whose arguments are linear in time are taken out; others stay where they are.
     """
-    symbols = {stage.name_in(k): ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())}
+    symbols = arguments_of(stage)
     t = symbols["t"]
     angles: list[ca.SX] = []
     cosines: list[ca.SX] = []
@@ -383,61 +370,38 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
     rate = ca.jacobian(angle, t)
     cosine, sine, turning = ca.vertcat(*cosines), ca.vertcat(*sines), ca.SX.sym("at", len(angles))
     wt = ca.jtimes(w, ca.vertcat(t, cosine, sine), ca.vertcat(1.0, -sine * turning, cosine * turning))
-    made = ca.Function("angles", [*symbols.values()], [ca.densify(angle), ca.densify(rate)], [*symbols], ["a", "at"])
-    directions = {"C": cosine, "S": sine}
-    results = ca.cse([ca.densify(w), ca.densify(wt)])
-    takes = {**directions, **symbols}
-    plain = ca.Function("stage_turned", [*takes.values()], ca.cse([ca.densify(w)]), [*takes], ["w"])
-    takes = {**directions, "at": turning, **symbols}
-    rated = ca.Function("stage_rate_turned", [*takes.values()], results, [*takes], ["w", "wt"])
     words = "from cosines and sines of its angles"
+    takes = {"C": cosine, "S": sine, **symbols}
     # the angles move with inputs, parameters and constants as well
     moving = {name: symbols[name] for name in ("t", "u", "p", "c")}
     seeds = ca.vertcat(*moving.values())
     by_angle = ca.jacobian(w, sine) @ ca.diag(cosine) - ca.jacobian(w, cosine) @ ca.diag(sine)
     slopes = ca.jacobian(w, seeds) + by_angle @ ca.jacobian(angle, seeds)
     entries: ca.SX = slopes.nz[:]
-    takes = {**directions, **symbols}
-    sloped = ca.Function("stage_slopes", [*takes.values()], ca.cse([ca.densify(w), entries]), [*takes], ["w", "J"])
     known = ca.SX.sym("J", entries.numel())
     along = {f"{name}_d": ca.SX.sym(f"{name}_d", moving[name].numel()) for name in moving}
-    change = ca.densify(ca.SX(slopes.sparsity(), known) @ ca.vertcat(*along.values()))
-    moved = ca.Function("stage_moved", [known, *along.values()], [change], ["J", *along], ["w_d"])
+    change = ca.SX(slopes.sparsity(), known) @ ca.vertcat(*along.values())
+    rated = f"Stage variables and their time derivatives {words}"
+    sloped = f"Stage variables {words}, and their derivatives by t, u, p, c"
     return (
-        Kernel(function=made, description="Angles of a stage and their rates"),
+        _kernel("angles", symbols, {"a": angle, "at": rate}, "Angles of a stage and their rates"),
         (
-            Kernel(function=plain, description=f"Stage variables {words}"),
-            Kernel(function=rated, description=f"Stage variables and their time derivatives {words}"),
+            _kernel("stage_turned", takes, {"w": w}, f"Stage variables {words}"),
+            _kernel("stage_rate_turned", {"C": cosine, "S": sine, "at": turning, **symbols}, {"w": w, "wt": wt}, rated),
         ),
-        Kernel(function=sloped, description=f"Stage variables {words}, and their derivatives by t, u, p, c"),
-        Kernel(function=moved, description="Stage variables"),
+        _kernel("stage_slopes", takes, {"w": w, "J": entries}, sloped),
+        _kernel("stage_moved", {"J": known, **along}, {"w_d": change}, "Stage variables"),
     )
 
 
-#: Directional derivatives for sensitivities: name, kernel, the arguments that move, and the results that are wanted.
-_TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("stage_rate_tangent", "stage_rate", ("t", "u", "p", "c"), ("w", "wt")),
-    ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
-    ("acceleration_tangent", "acceleration", ("x", "S", "r", "u", "p", "c", "w"), ("a",)),
-    ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "r", "u", "p", "c", "w"), ("A", "B")),
-    (
-        "acceleration_rate_tangent",
-        "acceleration_rate",
-        ("x", "S", "G", "r", "u", "p", "c", "w", "wt"),
-        ("at",),
-    ),
-)
+#: Kernels with directional derivatives, for sensitivities.
+_TANGENTS = ("stage_rate", "relative", "acceleration", "acceleration_jacobian", "acceleration_rate")
 
 
-def _tangent(kernel: Kernel, name: str, along: tuple[str, ...], results: tuple[str, ...]) -> Kernel:
-    """Derivative of a kernel's results along a direction of some of its arguments, named ``x_d`` for ``x``."""
+def _tangent(kernel: Kernel, results: Sequence[str] = ()) -> Kernel:
+    """Derivative of a kernel's results, or of some, along a direction of its arguments, named ``x_d`` for ``x``."""
     function = kernel.function
-    symbols = dict(zip(function.name_in(), function.sx_in(), strict=True))
-    values = dict(zip(function.name_out(), function.call([*symbols.values()], True, False), strict=True))
-    directions = {f"{k}_d": ca.SX.sym(f"{k}_d", symbols[k].numel()) for k in along}
-    point, direction = ca.vertcat(*(symbols[k] for k in along)), ca.vertcat(*directions.values())
-    moved = {f"{k}_d": ca.densify(ca.jtimes(ca.vec(values[k]), point, direction)) for k in results}
-    made = ca.Function(
-        name, [*symbols.values(), *directions.values()], ca.cse([*moved.values()]), [*symbols, *directions], [*moved]
-    )
-    return Kernel(function=made, description=f"Directional derivative of {function.name()}")
+    given, name = arguments_of(function), function.name()
+    values = dict(zip(function.name_out(), function.call([*given.values()], True, False), strict=True))
+    made = moved_along(f"{name}_tangent", given, {k: values[k] for k in results or values})
+    return Kernel(function=made, description=f"Directional derivative of {name}")

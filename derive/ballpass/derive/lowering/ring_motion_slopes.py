@@ -34,29 +34,20 @@ class RingMotionSlopes:
     Attributes
     ----------
     summands : (co, si, slope of F by the deflection, by the rate) -> distinct summands
-    by_ring : for each coefficient the places of the summands of dS; none for one that is a constant of a run
-    by_turn : for each entry of S the products that its derivative by the cage's angle adds up: sign, coefficient, place
+    by_ring : for each coefficient that is no constant of a run the places of the summands of dS
+    by_turn : for each entry of S the products that its derivative by the cage's angle adds up: coefficient, sign, place
     """
 
     summands: ca.Function
-    by_ring: tuple[tuple[int, int] | None, ...]
-    by_turn: tuple[tuple[tuple[int, int, int], ...], ...]
-
-    def by_coefficients(self, totals: ca.SX) -> ca.SX:
-        """d(S)/d(r) of deflection and rate, from the totals of the summands; zero for constants."""
-        pairs = (ca.SX(2, 1) if places is None else ca.vertcat(*(totals[k] for k in places)) for places in self.by_ring)
-        return ca.horzcat(*pairs)
+    by_ring: dict[int, tuple[int, int]]
+    by_turn: list[list[tuple[int, int, int]]]
 
     def by_relative(self, sums: ca.SX, totals: ca.SX, r: ca.SX) -> ca.SX:
-        """The same, and by cosine and sine of the cage's angle, which turns all balls at once."""
-        turned = []
-        for products in self.by_turn:
-            total = ca.SX(0.0)
-            for sign, k, place in products:
-                total = total + r[k] * totals[place] if sign > 0 else total - r[k] * totals[place]
-            turned.append(total)
+        """d(S)/d(r) from the totals of the summands; cosine and sine of the cage's angle turn all balls at once."""
+        turned = [sum(sign * (r[k] * totals[place]) for k, sign, place in products) for products in self.by_turn]
         turn = ca.vertcat(turned[0] - sums[1], turned[1] + sums[0])
-        return ca.horzcat(self.by_coefficients(totals), -r[RINGS + 1] * turn, r[RINGS] * turn)
+        pairs = (totals[[*self.by_ring[k]]] if k in self.by_ring else ca.SX(2, 1) for k in range(RINGS))
+        return ca.horzcat(*pairs, -r[RINGS + 1] * turn, r[RINGS] * turn)
 
 
 @cache
@@ -66,7 +57,7 @@ def ring_motion_slopes() -> RingMotionSlopes:
     direction, r = ca.vertcat(co, si), ca.SX.sym("r", RINGS)
     motion = ca.vertcat(*relative_motion(r, co, si))
     by_coefficient = ca.jacobian(motion, r)
-    by_turn = ca.jacobian(ca.jtimes(motion, direction, ca.vertcat(-si, co)), r)
+    turned = ca.jacobian(ca.jtimes(motion, direction, ca.vertcat(-si, co)), r)
     summands: list[ca.SX] = []
     values: list[float] = []
 
@@ -83,15 +74,7 @@ def ring_motion_slopes() -> RingMotionSlopes:
 
     # what no direction changes is made of constants of a run: nothing that moves enters by it
     moving = [k for k in range(RINGS) if ca.depends_on(by_coefficient[:, k], direction)]
-    by_ring: list[tuple[int, int] | None] = [None] * RINGS
-    for k in moving:
-        by_ring[k] = find(by_coefficient[:, k], co)[1], find(by_coefficient[:, k], si)[1]
-    products = []
-    for along in (co, si):
-        found = [(k, *find(by_turn[:, k], along)) for k in moving]
-        products.append(tuple((sign, k, place) for k, sign, place in found))
-    return RingMotionSlopes(
-        summands=ca.Function("summands", [co, si, by_delta, by_rate], [ca.vertcat(*summands)]),
-        by_ring=tuple(by_ring),
-        by_turn=tuple(products),
-    )
+    by_ring = {k: (find(by_coefficient[:, k], co)[1], find(by_coefficient[:, k], si)[1]) for k in moving}
+    by_turn = [[(k, *find(turned[:, k], along)) for k in moving] for along in (co, si)]
+    made = ca.Function("summands", [co, si, by_delta, by_rate], [ca.vertcat(*summands)])
+    return RingMotionSlopes(summands=made, by_ring=by_ring, by_turn=by_turn)

@@ -87,10 +87,6 @@ class Visitor:
 
     # what an expression depends on
 
-    def is_constant(self, expression: sp.Basic) -> bool:
-        """Whether the expression depends on this visitor's constant symbols only."""
-        return self._fixed(sp.sympify(expression))
-
     def _own(self, expression: sp.Basic) -> bool:
         found = self._is_own.get(expression)
         if found is None:
@@ -101,19 +97,19 @@ class Visitor:
             self._is_own[expression] = found
         return found
 
-    def _fixed(self, expression: sp.Basic) -> bool:
-        """Whether the expression depends on constant symbols only."""
+    def is_constant(self, expression: sp.Basic) -> bool:
+        """Whether the expression depends on this visitor's constant symbols only."""
         found = self._is_constant.get(expression)
         if found is None:
             if isinstance(expression, sp.Symbol):
                 if expression in self._constant:
                     found = True
                 elif expression in self._definitions:
-                    found = self._fixed(self._definitions[expression])
+                    found = self.is_constant(self._definitions[expression])
                 else:
-                    found = self._parent._fixed(expression) if self._parent is not None else False
+                    found = self._parent.is_constant(expression) if self._parent is not None else False
             else:
-                found = isinstance(expression, OF_IDEAL_LINKAGE) or all(self._fixed(a) for a in expression.args)
+                found = isinstance(expression, OF_IDEAL_LINKAGE) or all(self.is_constant(a) for a in expression.args)
             self._is_constant[expression] = found
         return found
 
@@ -137,11 +133,11 @@ class Visitor:
                 return self._values[expression]
             if expression in self._definitions:
                 defined = self._definitions[expression]
-                if self._hoist is not None and not _is_trivial(defined) and self._fixed(defined):
+                if self._hoist is not None and not _is_trivial(defined) and self.is_constant(defined):
                     return self._hoist(self._closed(expression))
                 return self(defined)
             raise ExpressionError(f"the symbol {expression} has no value here")
-        if self._hoist is not None and not _is_trivial(expression) and self._fixed(expression):
+        if self._hoist is not None and not _is_trivial(expression) and self.is_constant(expression):
             return self._hoist(self._closed(expression))
         if isinstance(expression, sp.Add | sp.Mul) and self._hoist is not None:
             expression = self._gather(expression)
@@ -149,10 +145,10 @@ class Visitor:
 
     def _gather(self, expression: sp.Add | sp.Mul) -> sp.Basic:
         """Constant factors or terms of a sum or product taken together, so that they are hoisted as one."""
-        constant = [a for a in expression.args if self._fixed(a)]
+        constant = [a for a in expression.args if self.is_constant(a)]
         if len(constant) < 2 or all(a.is_Number for a in constant):
             return expression
-        varying = [a for a in expression.args if not self._fixed(a)]
+        varying = [a for a in expression.args if not self.is_constant(a)]
         held = expression.func(*constant)
         if _is_trivial(held):
             return expression
@@ -214,7 +210,7 @@ class Visitor:
                 isinstance(factor, sp.Pow)
                 and factor.exp.is_Rational
                 and factor.exp.is_negative
-                and not self._fixed(factor)
+                and not self.is_constant(factor)
             ):
                 below.append(self(sp.Pow(factor.base, -factor.exp)))
             elif factor.is_Rational and not factor.is_Integer:
@@ -299,9 +295,9 @@ class Visitor:
     def _elliptic(self, expression: sp.Basic) -> ca.SX:
         (m,) = expression.args
         if m not in self._agm:
-            self._agm[m] = _complete_elliptic(ca.sqrt(1 - self(m)))
-        first, second = self._agm[m]
-        return first if isinstance(expression, sp.elliptic_k) else second
+            first, defect = _agm_sum(ca.sqrt(1 - self(m)))
+            self._agm[m] = first, first * (1 - defect)
+        return self._agm[m][isinstance(expression, sp.elliptic_e)]
 
 
 def _angle_between(one: tuple[ca.SX, ca.SX], other: tuple[ca.SX, ca.SX]) -> ca.SX:
@@ -336,11 +332,6 @@ def _agm_sum(complementary: ca.SX) -> tuple[ca.SX, ca.SX]:
         weight *= 2
         total = total + weight * c * c
     return ca.pi / (2 * a), total
-
-
-def _complete_elliptic(complementary: ca.SX) -> tuple[ca.SX, ca.SX]:
-    first, defect = _agm_sum(complementary)
-    return first, first * (1 - defect)
 
 
 def _ellipticity(ratio: ca.SX) -> ca.SX:

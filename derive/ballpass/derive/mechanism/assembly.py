@@ -1,13 +1,12 @@
 """The order in which a linkage is assembled: the driven body first, then Assur dyads until every body is placed.
 
-In: a `Mechanism`.  Out: an `Assembly`, or a `LinkageError` that names joints, bodies and the count of unknowns and
-equations.  Which dyads there are is `dyads.DYADS`.
+In: a `Mechanism`, whose driver is a revolute joint on the frame.  Out: dyads and wheels, or a `LinkageError` that names
+joints, bodies and the count of unknowns and equations.  Which dyads there are is `dyads.DYADS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 from ballpass.derive.mechanism.dyads import DYADS, Dyad, Group
@@ -20,90 +19,55 @@ from ballpass.derive.scene.table import FRAME
 LARGEST_GROUP = 8
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Assembly:
-    """The driver joint, the body it drives, and the dyads and wheels in the order in which they are placed."""
-
-    driver: Joint
-    driven: str
-    dyads: tuple[Group, ...]
-
-
-def assemble(mechanism: Mechanism) -> Assembly:
-    """Decide the order of assembly.
+def assemble(mechanism: Mechanism) -> list[Group]:
+    """The dyads and wheels in the order in which they are placed.
 
     Raises
     ------
     LinkageError
-        wrong mobility; a driver that is not a revolute joint on the frame; bodies that no sequence of dyads reaches, or
-        that the driver does not move; a branch that is missing, of the wrong kind, or set where it means nothing.
+        wrong mobility; bodies that no sequence of dyads reaches, or that the driver does not move; a branch that is
+        missing, of the wrong kind, or set where it means nothing.
     """
-    faults = [*_mobility_faults(mechanism), *_driver_faults(mechanism)]
-    if faults:
-        raise LinkageError(faults)
-    driver = mechanism.joint(mechanism.driver.joint)
-    driven = driver.other(FRAME)
+    _check_mobility(mechanism)
+    driven = mechanism.joint(mechanism.driver.joint).other(FRAME)
     placed, dyads = [FRAME, driven], list[Group]()
     while (dyad := next_gear(mechanism, placed) or _next_dyad(mechanism, placed)) is not None:
         dyads.append(dyad)
         placed.extend(dyad.bodies)
     left_over = [b.name for b in mechanism.bodies if b.name not in placed]
     if left_over:
-        raise LinkageError([_order_fault(mechanism, placed, left_over)])
+        raise _order_fault(mechanism, placed, left_over).of_linkage()
     pairs = [dyad for dyad in dyads if isinstance(dyad, Dyad)]
     faults = [*_idle_faults(driven, dyads), *_branch_faults(mechanism, pairs)]
     if faults:
         raise LinkageError(faults)
-    return Assembly(driver=driver, driven=driven, dyads=tuple(dyads))
+    return dyads
 
 
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) if names else "none"
 
 
-def _mobility_faults(mechanism: Mechanism) -> list[Fault]:
+def _check_mobility(mechanism: Mechanism) -> None:
     bodies, joints, gears = len(mechanism.bodies), len(mechanism.joints), len(mechanism.gears)
     unknowns, equations = 3 * bodies, 2 * joints + gears
     if unknowns - equations == 1:
-        return []
-    if unknowns - equations < 1:
-        remedy = "remove a joint or add a body: each joint takes two degrees of freedom, each body brings three"
-    else:
-        remedy = "add a joint or remove a body: each joint takes two degrees of freedom, each body brings three"
-    return [
-        Fault(
-            key="mechanism.joints",
-            problem=(
-                f"the linkage has mobility {unknowns - equations}: {unknowns} unknowns "
-                f"(3 for each of {bodies} moving bodies) and {equations} equations (2 for each of {joints} joints"
-                + (f", 1 for each of {gears} gears)" if gears else ")")
-            ),
-            given=(
-                f"bodies {_listed([b.name for b in mechanism.bodies])}; "
-                f"joints {_listed([j.name for j in mechanism.joints])}"
-            ),
-            allowed="mobility 1: one unknown more than equations, which the driver prescribes",
-            remedy=remedy,
-        )
-    ]
-
-
-def _driver_faults(mechanism: Mechanism) -> list[Fault]:
-    name = mechanism.driver.joint
-    joint = next((j for j in mechanism.joints if j.name == name), None)
-    allowed = "a revolute joint between the frame and the body it turns"
-    remedy = "name the joint by which the frame turns the crank"
-    key = "mechanism.driver.joint"
-    if joint is None:
-        return [Fault(key=key, problem="the driver names an unknown joint", given=name, allowed=allowed, remedy=remedy)]
-    given = f"{name}, {joint.kind}, between {joint.bodies[0]} and {joint.bodies[1]}"
-    if joint.kind != "revolute":
-        problem = "a prismatic joint cannot be the driver"
-        return [Fault(key=key, problem=problem, given=given, allowed=allowed, remedy=remedy)]
-    if (joint.bodies[0] == FRAME) == (joint.bodies[1] == FRAME):
-        problem = "the driver's joint does not join a moving body to the frame"
-        return [Fault(key=key, problem=problem, given=given, allowed=allowed, remedy=remedy)]
-    return []
+        return
+    change = "remove a joint or add a body" if unknowns - equations < 1 else "add a joint or remove a body"
+    raise Fault(
+        key="mechanism.joints",
+        problem=(
+            f"the linkage has mobility {unknowns - equations}: {unknowns} unknowns "
+            f"(3 for each of {bodies} moving bodies) and {equations} equations (2 for each of {joints} joints"
+            + (f", 1 for each of {gears} gears)" if gears else ")")
+        ),
+        given=(
+            f"bodies {_listed([b.name for b in mechanism.bodies])}; "
+            f"joints {_listed([j.name for j in mechanism.joints])}"
+        ),
+        allowed="mobility 1: one unknown more than equations, which the driver prescribes",
+        remedy=f"{change}: each joint takes two degrees of freedom, each body brings three",
+    ).of_linkage()
 
 
 def _joints_to(mechanism: Mechanism, body: str, others: Sequence[str]) -> list[Joint]:

@@ -43,32 +43,9 @@ class Guide:
     travel: sp.Expr
 
     @property
-    def fixed(self) -> bool:
-        """The host is the frame, so the slider does not turn."""
-        return self.host == FRAME
-
-    @property
     def normal(self) -> Pair:
         """Unit vector to the left of `direction`."""
         return quarter_turn(self.direction)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mesh:
-    """Teeth of two wheels: a force of one unknown size.
-
-    Attributes
-    ----------
-    joint : the gear as a joint, at points on the axes
-    size : unknown [N]
-    direction : of the force on its first body, of tangential part one
-    shifts : from these points to where the force acts, in the frame's axes [m]
-    """
-
-    joint: Joint
-    size: sp.Symbol
-    direction: Pair
-    shifts: tuple[Pair, Pair]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,17 +64,16 @@ class AppliedLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointAction:
-    """Forces and moment of one joint on its two bodies.
+    """Forces and moment of one joint on its two bodies; of a gear as a joint, at points on the axes.
 
-    `along` holds the unknown force components with their directions.  The force acts on each body at `point` of that
-    body plus `shift` (a vector in the frame's axes).
+    `along` holds the unknown force components with their directions.  The force acts on each body at the joint's point
+    plus one of `shifts` (vectors in the frame's axes).
     """
 
     joint: Joint
     along: tuple[tuple[sp.Symbol, Pair], ...]
-    moment: sp.Symbol | None
-    points: tuple[Pair, Pair]
-    shifts: tuple[Pair, Pair]
+    moment: sp.Symbol | None = None
+    shifts: tuple[Pair, Pair] = (ZERO, ZERO)
 
     def sign(self, body: str) -> int:
         """+1 on the first body, −1 on the second."""
@@ -128,7 +104,7 @@ class Balance:
         poses: Mapping[str, Pose],
         driver: Joint,
         guides: Mapping[str, Guide],
-        meshes: Sequence[Mesh],
+        meshes: Sequence[JointAction],
         loads: Sequence[AppliedLoad],
         moments: frozenset[str],
     ) -> None:
@@ -136,20 +112,18 @@ class Balance:
         self._poses = poses
         self._guides = guides
         self._loads = loads
-        self._without_moment = [g.slider for name, g in guides.items() if g.fixed and name not in moments]
+        self._without_moment = [g.slider for name, g in guides.items() if g.host == FRAME and name not in moments]
         ordered = [j for j in mechanism.joints if j is not driver] + [driver]
-        self.contacts = {mesh.joint.name: self._teeth(mesh) for mesh in meshes}
+        self.contacts = {mesh.joint.name: mesh for mesh in meshes}
         self.contacts |= {joint.name: self._contact(joint) for joint in ordered}
         self._solved: list[JointAction] = []
 
     def _contact(self, joint: Joint) -> JointAction:
-        first, second = (self.point(joint, body) for body in joint.bodies)
         guide = self._guides.get(joint.name)
         prefix = f"reaction.{joint.name}"
         if guide is None:
             x, y = sp.symbols((f"{prefix}.x", f"{prefix}.y"), real=True)
-            along: tuple[tuple[sp.Symbol, Pair], ...] = ((x, (sp.S.One, sp.S.Zero)), (y, (sp.S.Zero, sp.S.One)))
-            return JointAction(joint=joint, along=along, moment=None, points=(first, second), shifts=(ZERO, ZERO))
+            return JointAction(joint=joint, along=((x, (sp.S.One, sp.S.Zero)), (y, (sp.S.Zero, sp.S.One))))
         # The force acts where points[1] is: on bodies[0] that place moves along the guide.
         travel = guide.travel if guide.slider == joint.bodies[1] else -guide.travel
         moment = None if guide.slider in self._without_moment else sp.Symbol(f"{prefix}.moment", real=True)
@@ -157,15 +131,8 @@ class Balance:
             joint=joint,
             along=((sp.Symbol(f"{prefix}.normal", real=True), guide.normal),),
             moment=moment,
-            points=(first, second),
             shifts=(scale(travel, guide.direction), ZERO),
         )
-
-    def _teeth(self, mesh: Mesh) -> JointAction:
-        joint = mesh.joint
-        first, second = (self.point(joint, body) for body in joint.bodies)
-        along = ((mesh.size, mesh.direction),)
-        return JointAction(joint=joint, along=along, moment=None, points=(first, second), shifts=mesh.shifts)
 
     @property
     def unknowns(self) -> tuple[sp.Symbol, ...]:
@@ -185,7 +152,7 @@ class Balance:
     def contact_arm(self, contact: JointAction, body: str, about: Pair) -> Pair:
         """From a body point to where a joint's force acts on the body, in the frame's axes [m]."""
         side = contact.joint.bodies.index(body)
-        return add(self._arm(body, contact.points[side], about), contact.shifts[side])
+        return add(self._arm(body, self.point(contact.joint, body), about), contact.shifts[side])
 
     def point(self, joint: Joint, body: str) -> Pair:
         """Point of a joint on one of its bodies, in body axes [m]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,28 +21,20 @@ class Evaluator:
     ----------
     definitions : ordered; those that no result needs are left out
     results : expressions in parameters, inputs and defined symbols
-    given : symbols whose definitions are ignored: their values come with the call
     """
 
-    def __init__(
-        self, definitions: Sequence[Definition], results: Sequence[sp.Expr], given: Iterable[sp.Symbol] = ()
-    ) -> None:
-        own = {d.symbol: d for d in definitions}
-        for symbol in given:
-            own.pop(symbol, None)
-        needed = set[sp.Symbol]()
-        for expression in results:
-            needed |= sp.sympify(expression).free_symbols
+    def __init__(self, definitions: Sequence[Definition], results: Sequence[sp.Expr]) -> None:
+        needed = set[sp.Symbol]().union(*(sp.sympify(expression).free_symbols for expression in results))
         kept = []
         for definition in reversed(definitions):
-            if definition.symbol in needed and definition.symbol in own:
+            if definition.symbol in needed:
                 kept.append(definition)
                 needed |= sp.sympify(definition.expression).free_symbols
         self._steps = [(d.symbol, *_compile(d.expression)) for d in reversed(kept)]
         self._results = [_compile(e) for e in results]
 
     def __call__(self, values: Values) -> list[Any]:
-        """Values of the results; arrays where a given value is one.
+        """Values of the results; arrays where a given value is one.  A value that is given replaces its definition.
 
         Raises
         ------
@@ -51,7 +43,8 @@ class Evaluator:
         """
         known = dict(values)
         for symbol, function, arguments in self._steps:
-            known[symbol] = function(*(known[a] for a in arguments))
+            if symbol not in values:
+                known[symbol] = function(*(known[a] for a in arguments))
         return [function(*(known[a] for a in arguments)) for function, arguments in self._results]
 
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Balance, Mesh
+from ballpass.derive.mechanism.balance import Balance, JointAction
 from ballpass.derive.mechanism.dyads.dyad import Group, Margin, Placement, name_acceleration, name_hinge, name_rate
 from ballpass.derive.mechanism.kinematics import Ledger, Play, Pose, Turn, body_point, joint_point, name_turn, place
-from ballpass.derive.mechanism.vectors import Pair, add, cross, dot, quarter_turn, rotate, scale, subtract
+from ballpass.derive.mechanism.vectors import add, cross, dot, quarter_turn, rotate, scale, subtract, unit
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Gear, Joint, Mechanism
 from ballpass.derive.scene.table import FRAME
@@ -111,22 +111,19 @@ class GearPair(Group):
         apart = dot(across, across) / (dot(across, across) + dot(ends[0], ends[0]) + dot(ends[1], ends[1]))
         if gear.radius is not None:
             apart = 1 - (self.radii[0] - self.radii[1]) ** 2 / dot(across, across)
-        mark, words = (
-            subscript(wheel),
-            f"squared distance of the axes of gear {gear.name}, by the squared lengths to it",
-        )
+        words = f"squared distance of the axes of gear {gear.name}, by the squared lengths to it"
         angle, both = None, ((carrier.cos, carrier.sin), (partner.cos, partner.sin))
         if carrier.angle is not None and partner.angle is not None:
             turned = start + ratio * (partner.angle - carrier.angle - other)
             angle = carrier.angle + turned
-            cos, sin = sp.cos(angle), sp.sin(angle)
+            cos, sin = unit(angle)
         else:
             # within half a turn of the position that the scene names; opposite to it the angle would jump
             seen = (dot(*both), cross(*both))
             seen = rotate(sp.cos(other), -sp.sin(other), seen)
-            cos, sin = rotate(*both[0], _unit(start + ratio * sp.atan2(seen[1], seen[0])))
+            cos, sin = rotate(*both[0], unit(start + ratio * sp.atan2(seen[1], seen[0])))
             apart, words = apart * (1 + seen[0]) / 2, f"{words}, and how far the other wheel is from half a turn"
-        cos, sin = name_turn(ledger, wheel, cos, sin, mark)
+        cos, sin = name_turn(ledger, wheel, cos, sin, subscript(wheel))
         turn = Turn(
             cos=cos,
             sin=sin,
@@ -161,7 +158,7 @@ class GearPair(Group):
             margin=Margin(joint=hinge.name, expression=apart, description=words),
         )
 
-    def meshing(self, placement: Placement) -> Mesh:
+    def meshing(self, placement: Placement) -> JointAction:
         """The gear in balances: a force that drives along the tangent and pushes the wheels apart; of a belt the pull
         of the strand that carries, where it leaves the pulleys."""
         (along,), (first, second), across = placement.spans, self.radii, quarter_turn(placement.spans[0])
@@ -176,7 +173,7 @@ class GearPair(Group):
             normal = subtract(scale(cosine, along), scale(sine, across))
         size = sp.Symbol(f"gear.{self.gear.name}.tangential", real=True)
         shifts = scale(first, normal), scale(second, normal)
-        return Mesh(joint=self.mesh, size=size, direction=direction, shifts=shifts)
+        return JointAction(joint=self.mesh, along=((size, direction),), shifts=shifts)
 
     def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
         """Teeth: moment of the wheel about its axis; then the hinge."""
@@ -204,10 +201,6 @@ class GearPair(Group):
         ledger.define(f"gear.{name}.force", normal, "N", f"force {words} along its line of action", f"F_{{n,{mark}}}")
         balance.know(name)
         balance.solve_hinge_by_forces(ledger, hinge, wheel)
-
-
-def _unit(angle: sp.Expr) -> Pair:
-    return sp.cos(angle), sp.sin(angle)
 
 
 #: Points of a carrier and of a wheel on the wheel's axis, and joints that hold it there.

@@ -15,7 +15,7 @@ from ballpass.derive.mechanism.vectors import ZERO, Pair, add, quarter_turn, rot
 from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Body, Joint, Mechanism
 from ballpass.derive.scene.quantity import Vector
 from ballpass.derive.scene.table import FRAME
-from ballpass.derive.terms import Definition, components, subscript, symbol_of
+from ballpass.derive.terms import Definition, components, defined, subscript, symbol_of
 
 
 class AxialPoint(tuple[sp.Expr, sp.Expr]):
@@ -128,12 +128,8 @@ class Ledger:
 
     def define(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Symbol:
         """Define a symbol for the expression and return it."""
-        symbol = sp.Symbol(name, real=True)
-        sentence = description[0].upper() + description[1:]
-        self._definitions.append(
-            Definition(symbol=symbol, expression=expression, unit=unit, description=sentence, latex=latex)
-        )
-        return symbol
+        self._definitions.append(defined(name, expression, unit, description[0].upper() + description[1:], latex))
+        return self._definitions[-1].symbol
 
     def name(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Expr:
         """As `define`, but numbers and symbols, which need no name, are returned unchanged."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.mechanism.kinematics import Ledger
+from ballpass.derive.mechanism.kinematics import Ledger, Motion
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import Coordinate
 
@@ -27,6 +27,12 @@ class Inertia:
     amount: sp.Expr
     rate: sp.Expr
     acceleration: sp.Expr
+
+
+def inertias_of(mass: sp.Expr, moving: Motion) -> list[Inertia]:
+    """A mass that moves in the plane, or an inertia whose rates are pairs."""
+    rates = zip(moving.velocity, moving.acceleration, strict=True)
+    return [Inertia(amount=mass, rate=rate, acceleration=acceleration) for rate, acceleration in rates]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,11 +73,6 @@ class LinearForms:
         self._columns: dict[sp.Symbol, tuple[sp.Expr, ...]] = {}
         self._biases: dict[sp.Symbol, sp.Expr] = {}
         self._ledger = Ledger()
-
-    @property
-    def definitions(self) -> tuple[Definition, ...]:
-        """What has been named so far."""
-        return self._ledger.definitions
 
     def columns(self, rate: sp.Expr) -> tuple[sp.Expr, ...]:
         """Derivatives of a velocity by the generalized velocities."""
@@ -167,4 +168,5 @@ class LinearForms:
                 f"f_{{{symbols[i]}}}",
             )
         full = sp.ImmutableMatrix(size, size, lambda i, j: mass[max(i, j)][min(i, j)])
-        return EquationsOfMotion(mass=full, forcing=sp.ImmutableMatrix(size, 1, forcing), definitions=self.definitions)
+        forces, named = sp.ImmutableMatrix(size, 1, forcing), self._ledger.definitions
+        return EquationsOfMotion(mass=full, forcing=forces, definitions=named)

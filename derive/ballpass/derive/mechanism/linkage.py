@@ -17,7 +17,7 @@ import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.assembly import assemble
-from ballpass.derive.mechanism.balance import Mesh
+from ballpass.derive.mechanism.balance import JointAction
 from ballpass.derive.mechanism.dyads import Group, Margin, Placement
 from ballpass.derive.mechanism.evaluator import Evaluator
 from ballpass.derive.mechanism.kinematics import (
@@ -34,16 +34,13 @@ from ballpass.derive.mechanism.kinematics import (
     place,
 )
 from ballpass.derive.mechanism.vectors import Pair
-from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.mechanism_records import Joint, Mechanism
+from ballpass.derive.scene.errors import Fault
+from ballpass.derive.scene.mechanism_records import CENTER_OF_MASS, Joint, Mechanism
 from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import Definition, subscript
 
 #: Joints that keep their two points together.
 NO_PLAY: Play = MappingProxyType({})
-
-#: Name of the centre of mass among the points for drawing.
-CENTER_OF_MASS = "center_of_mass"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +98,7 @@ class Linkage:
         return (*self.mechanism.joints, *(mesh.joint for mesh in self.meshes))
 
     @property
-    def meshes(self) -> tuple[Mesh, ...]:
+    def meshes(self) -> tuple[JointAction, ...]:
         """Contacts that are no joints of the mechanism."""
         return tuple(mesh for p in self.placements if (mesh := p.dyad.meshing(p)) is not None)
 
@@ -143,16 +140,15 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY, slo
     Raises
     ------
     LinkageError
-        wrong mobility, a driver that is not a revolute joint on the frame, bodies that no sequence of dyads reaches, a
-        branch that is missing, of the wrong kind, or set where it means nothing.
+        wrong mobility, bodies that no sequence of dyads reaches, a branch that is missing, of the wrong kind, or set
+        where it means nothing.
     """
-    assembly = assemble(mechanism)
-    ledger = Ledger()
-    poses = {FRAME: frame_pose()}
-    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive, play, slope)
-    poses[driven.body] = driven
+    dyads = assemble(mechanism)
+    driver, ledger = mechanism.joint(mechanism.driver.joint), Ledger()
+    driven = _place_driven(ledger, mechanism, driver, drive, play, slope)
+    poses = {FRAME: frame_pose(), driven.body: driven}
     placements = []
-    for dyad in assembly.dyads:
+    for dyad in dyads:
         placement = dyad.place(ledger, mechanism, poses, play)
         poses |= {pose.body: pose for pose in placement.poses}
         placements.append(placement)
@@ -160,8 +156,8 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY, slo
     return Linkage(
         mechanism=mechanism,
         drive=drive,
-        driver=assembly.driver,
-        driven=assembly.driven,
+        driver=driver,
+        driven=driven.body,
         definitions=ledger.definitions,
         poses=MappingProxyType(moving),
         placements=tuple(placements),
@@ -190,36 +186,27 @@ def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
     numbers |= dict.fromkeys(linkage.positions, 0.0) | {driven.cos: np.cos(start), driven.sin: np.sin(start)}
     of_drive = sp.sympify(driven.angle).free_symbols - numbers.keys()  # the angle, or the phase of a swing
     numbers |= {symbol: start if symbol == driven.angle else 0.0 for symbol in of_drive}
-    evaluator = Evaluator(linkage.definitions, [m.expression for m in linkage.margins], given=(driven.cos, driven.sin))
+    evaluator = Evaluator(linkage.definitions, [m.expression for m in linkage.margins])
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         margins = [float(margin) for margin in evaluator(numbers)]
     for margin, placement in zip(margins, linkage.placements, strict=True):
         if not margin > 0.0:  # dyads behind it cannot be placed
             joints = ", ".join(placement.dyad.joints)
-            raise LinkageError(
-                [
-                    Fault(
-                        key=f"mechanism.joints.{placement.margin.joint}",
-                        problem=f"the linkage cannot be assembled at joint {placement.margin.joint} at the crank angle "
-                        f"of its start, {np.rad2deg(start):.4f} deg",
-                        given=f"{placement.margin.description}: {margin:.6g} there"
-                        + ("" if math.isfinite(margin) else ": is a length zero?"),
-                        allowed="above 0",
-                        remedy=f"change the lengths between joints {joints}, or mechanism.driver.start_angle",
-                    )
-                ]
-            )
+            raise Fault(
+                key=f"mechanism.joints.{placement.margin.joint}",
+                problem=f"the linkage cannot be assembled at joint {placement.margin.joint} at the crank angle of its "
+                f"start, {np.rad2deg(start):.4f} deg",
+                given=f"{placement.margin.description}: {margin:.6g} there"
+                + ("" if math.isfinite(margin) else ": is a length zero?"),
+                allowed="above 0",
+                remedy=f"change the lengths between joints {joints}, or mechanism.driver.start_angle",
+            ).of_linkage()
 
 
 def _place_driven(
-    ledger: Ledger,
-    mechanism: Mechanism,
-    driver: Joint,
-    body: str,
-    drive: Drive,
-    play: Play,
-    slope: Motion | None,
+    ledger: Ledger, mechanism: Mechanism, driver: Joint, drive: Drive, play: Play, slope: Motion | None
 ) -> Pose:
+    body = driver.other(FRAME)
     mark, (angle, rate, acceleration) = subscript(body), drive.driven
     cos, sin = name_turn(ledger, body, sp.cos(angle), sp.sin(angle), mark)
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import AppliedLoad
-from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia, inertias_of
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.vectors import ZERO
 from ballpass.derive.terms import components, symbol_of
@@ -40,14 +40,10 @@ def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
 
 def inertia_of(linkage: Linkage) -> tuple[Inertia, ...]:
     """Inertia of the bodies and of a drive's flywheel."""
-    inertias, drive = [], linkage.drive
+    inertias, drive = list[Inertia](), linkage.drive
     for body in linkage.mechanism.bodies:
-        pose, mass = linkage.poses[body.name], symbol_of(body.mass)
-        center = pose.center_of_mass
-        inertias += [
-            Inertia(amount=mass, rate=v, acceleration=a)
-            for v, a in zip(center.velocity, center.acceleration, strict=True)
-        ]
+        pose = linkage.poses[body.name]
+        inertias += inertias_of(symbol_of(body.mass), pose.center_of_mass)
         if body.inertia is not None and pose.rate != 0:
             inertias.append(Inertia(amount=symbol_of(body.inertia), rate=pose.rate, acceleration=pose.acceleration))
     if drive.flywheel != 0:

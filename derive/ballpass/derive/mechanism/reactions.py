@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance, Guide
+from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance
 from ballpass.derive.mechanism.kinematics import Ledger, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.vectors import Pair
@@ -63,11 +63,11 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     Raises
     ------
     LinkageError
-        a body without inertia whose moment balance is needed; `moments` names a joint that is not prismatic.
+        a body without inertia whose moment balance is needed.
     """
     mechanism = linkage.mechanism
     guides = {guide.joint.name: guide for p in linkage.placements for guide in p.guides}
-    _refuse(linkage, guides, moments)
+    _refuse_massless_turning(linkage)
     driver, driven = linkage.driver, linkage.driven
     balance = Balance(mechanism, linkage.poses, driver, guides, linkage.meshes, loads, moments)
     matrix, right_side, rows = balance.equations(driven)
@@ -92,7 +92,7 @@ def derive_reactions(linkage: Linkage, loads: Sequence[AppliedLoad], moments: fr
     )
 
 
-def _refuse(linkage: Linkage, guides: Mapping[str, Guide], moments: frozenset[str]) -> None:
+def _refuse_massless_turning(linkage: Linkage) -> None:
     faults = [
         Fault(
             key=f"mechanism.bodies.{body.name}.inertia",
@@ -103,17 +103,6 @@ def _refuse(linkage: Linkage, guides: Mapping[str, Guide], moments: frozenset[st
         )
         for body in linkage.mechanism.bodies
         if body.inertia is None and linkage.poses[body.name].rate != 0
-    ]
-    faults += [
-        Fault(
-            key=f"mechanism.joints.{name}",
-            problem=f"the guide moment of joint {name} is asked for, and it is not a prismatic joint",
-            given=name,
-            allowed=", ".join(guides) or "nothing: the linkage has no prismatic joint",
-            remedy=f"leave the moment of {name} out of the outputs",
-        )
-        for name in sorted(moments)
-        if name not in guides
     ]
     if faults:
         raise LinkageError(faults)

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.vectors import Pair, rotate
 from ballpass.derive.terms import Definition, defined, subscript, symbol_of
@@ -83,11 +82,6 @@ class Swing(Terms):
 
 #: A body that does not turn.
 STILL = Swing(turns=sp.S.Zero, rate=sp.S.Zero)
-
-
-def with_driver(drive: Drive) -> Swing:
-    """Of the driven body, or of what a shaft carries."""
-    return Swing(turns=sp.S.One, rate=drive.speed)
 
 
 def nearest(direction: Pair, known: sp.Expr) -> sp.Expr:

@@ -35,6 +35,11 @@ def cross(left: Pair, right: Pair) -> sp.Expr:
     return left[0] * right[1] - left[1] * right[0]
 
 
+def unit(angle: sp.Expr) -> Pair:
+    """The unit vector at an angle from +x [rad]."""
+    return sp.cos(angle), sp.sin(angle)
+
+
 def quarter_turn(vector: Pair) -> Pair:
     """The vector turned by 90 degrees counter-clockwise."""
     return -vector[1], vector[0]

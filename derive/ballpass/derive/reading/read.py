@@ -19,6 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ballpass.derive.mechanism.assembly import assemble
 from ballpass.derive.reading.change_coupling import Coupling, recoupled
 from ballpass.derive.reading.read_duty import duty_faults
 from ballpass.derive.reading.read_tables import TABLES, read_tables
@@ -185,8 +186,6 @@ def _scene(
     places = [fault.key for fault in collector.faults]
     if scene.mechanism is not None and not any(key.startswith(topology) or key in none for key in places):
         # faults that the derivation would find next are reported with the rest
-        from ballpass.derive.mechanism.assembly import assemble  # importing SymPy takes longer than reading most scenes
-
         try:
             assemble(scene.mechanism)
         except SceneError as error:

@@ -28,7 +28,7 @@ from ballpass.derive.scene.keys import ChoiceKey, Needs, PairKey
 from ballpass.derive.scene.mechanism_records import Mechanism
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.rating_records import Catalogue
-from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_keys, read_record
+from ballpass.derive.scene.read_keys import Either, choices_of, keys_of, read_inner, read_keys, read_record
 from ballpass.derive.scene.shaft_records import Shaft
 from ballpass.derive.scene.table import FRAME, Table, listing, suggest
 from ballpass.derive.scene.units import show
@@ -164,9 +164,7 @@ def _read_place(
             remedy="give the bearing its position, or delete transverse_inertia",
         )
     place = name, share, position, count, offset
-    if mechanism is None:
-        return place
-    if not name or not mechanism.joints:
+    if mechanism is None or not name or not mechanism.joints:
         return place
     joint = next((joint for joint in mechanism.joints if joint.name == name), None)
     names, given = [joint.name for joint in mechanism.joints], show(name)
@@ -177,10 +175,8 @@ def _read_place(
         return place
     elif coupling == "two-way" and joint.kind != "revolute":
         problem, remedy = "the bearing must sit at a revolute joint", "name one of these joints"
-        given, allowed = (
-            f"{given}, a {joint.kind} joint",
-            listing([j.name for j in mechanism.joints if j.kind == "revolute"]),
-        )
+        given = f"{given}, a {joint.kind} joint"
+        allowed = listing([j.name for j in mechanism.joints if j.kind == "revolute"])
     elif (
         coupling == "one-way" and driven is not None and joint.name not in (hinges := _driven_hinges(mechanism, driven))
     ):
@@ -260,8 +256,8 @@ def _read_inner_ring(table: Table, with_mechanism: bool, tilts: bool) -> InnerRi
                 allowed='mass, as in "0.4 kg"',
                 remedy='write mass = "0.4 kg" instead',
             )
-        with ring.table("equivalent_mass", "ring, crankpin and crank") as parts:
-            return read_record(InnerRing, ring, mass=read_record(EquivalentMass, parts))
+        mass = read_inner(EquivalentMass, ring, "equivalent_mass", "ring, crankpin and crank")
+        return read_record(InnerRing, ring, mass=mass)
 
 
 def _read_outer_ring(table: Table) -> tuple[str | None, OuterRing | None]:

@@ -84,10 +84,8 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
     allowed, remedy = f'{listing(GROUPS)}, or a length, as in "10 um"', "write the clearance as a number"
     if given in GROUPS and kind is None:
         problem = "a group of clearance holds for a bore, and none is known"
-        allowed, remedy = (
-            'a length, as in "10 um"; a group only together with designation',
-            f'add designation = "6204", or {remedy}',
-        )
+        allowed = 'a length, as in "10 um"; a group only together with designation'
+        remedy = f'add designation = "6204", or {remedy}'
     elif given in GROUPS and kind is not None:
         problem, allowed = no_group(kind)
         remedy = f"name one of them, or {remedy}"

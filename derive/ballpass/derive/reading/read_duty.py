@@ -13,7 +13,7 @@ from typing import Any
 from ballpass.derive.reading.values import parse_override, with_values
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.rating_records import Alignment, Lubrication
-from ballpass.derive.scene.read_keys import read_record
+from ballpass.derive.scene.read_keys import read_inner, read_record
 from ballpass.derive.scene.records import DutyState, Scene
 from ballpass.derive.scene.table import Table, listing
 from ballpass.derive.scene.units import show
@@ -57,25 +57,22 @@ def _read_state(table: Table, name: str, scene: Scene) -> DutyState:
         numbers: dict[str, float] = {}
         given = state.table("set", required=False).data
         for path, value in _leaves(given):
+            if not isinstance(value, str | int | float) or isinstance(value, bool):
+                state.fault(
+                    f"set.{path}",
+                    "this is not a value of a number",
+                    given=show(value),
+                    allowed='text with a unit, as in "20 um"',
+                    remedy="write one number for one path",
+                )
+                continue
             try:
-                if not isinstance(value, str | int | float) or isinstance(value, bool):
-                    raise SceneError([_no_value(path, value)])
                 _, numbers[path] = parse_override(scene, f"{path}={value}")
             except SceneError as error:
                 for fault in error.faults:
                     words = {"given": fault.given, "allowed": fault.allowed, "remedy": fault.remedy}
                     state.fault(f"set.{path}", fault.problem, **words)
         return read_record(DutyState, state, name=name, parameters=tuple(numbers.items()))
-
-
-def _no_value(path: str, value: Any) -> Fault:
-    return Fault(
-        key=path,
-        problem="this is not a value of a number",
-        given=show(value),
-        allowed='text with a unit, as in "20 um"',
-        remedy="write one number for one path",
-    )
 
 
 def _leaves(data: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -89,10 +86,8 @@ def _leaves(data: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
 
 def read_alignment(table: Table) -> Alignment | None:
     """Misalignment and shaft of a bearing; None where the scene says nothing of them."""
-    if not table.has("alignment"):
-        return None
-    with table.table("alignment", "misalignment, or span and shaft_diameter") as said:
-        return read_record(Alignment, said)
+    example = "misalignment, or span and shaft_diameter"
+    return read_inner(Alignment, table, "alignment", example) if table.has("alignment") else None
 
 
 def read_lubrication(table: Table) -> Lubrication | None:

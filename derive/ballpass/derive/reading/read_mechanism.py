@@ -32,7 +32,7 @@ from ballpass.derive.scene.mechanism_records import (
     SpeedOverTime,
 )
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
-from ballpass.derive.scene.read_keys import keys_of, number, read_record
+from ballpass.derive.scene.read_keys import keys_of, number, read_inner, read_record
 from ballpass.derive.scene.table import FRAME, Table, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
@@ -111,17 +111,12 @@ def _read_driver(table: Table) -> Driver:
             joint=joint,
             speed=speed,
             start_angle=start,
-            range=_read_range(driver) if driver.has("range") else None,
+            range=read_inner(DriverRange, driver, "range", "start and end") if driver.has("range") else None,
             swing=None if swing is None else swing.amplitude,
             table=over_time,
             torque=_read_torque(driver) if by_torque else None,
             flywheel=_read_flywheel(driver) if driver.has("flywheel") else None,
         )
-
-
-def _read_range(driver: Table) -> DriverRange:
-    with driver.table("range", "start and end") as data:
-        return read_record(DriverRange, data)
 
 
 def _read_swing(driver: Table) -> OscillatingDriver:
@@ -132,8 +127,7 @@ def _read_swing(driver: Table) -> OscillatingDriver:
         allowed="one of speed, table, swing, and speed with torque",
         remedy="delete the key, or the swing",
     )
-    with driver.table("swing", "amplitude and frequency") as data:
-        return read_record(OscillatingDriver, data)
+    return read_inner(OscillatingDriver, driver, "swing", "amplitude and frequency")
 
 
 def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None]:
@@ -144,8 +138,7 @@ def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None
         allowed="one of speed, table, and speed with torque",
         remedy="delete the key, or the table",
     )
-    with driver.table("table", "time and speed") as data:
-        found = read_record(SpeedOverTime, data)
+    found = read_inner(SpeedOverTime, driver, "table", "time and speed")
     if not found.later_speed:  # reported
         return SceneNumber(path="", value=math.nan, unit="rad/s", description="", latex=""), None
     return found.later_speed[0], replace(found, later_speed=found.later_speed[1:])

@@ -11,7 +11,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar, cast
 
+from ballpass.derive.drive import known_drive
 from ballpass.derive.mechanism.forces.angle_table import MOST_TURNS, AngleTable
+from ballpass.derive.mechanism.linkage import derive_linkage
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import read_duty
 from ballpass.derive.reading.read_load import read_load
@@ -130,9 +132,6 @@ def _turns_of_loads(
     laws = [force.law for force in mechanism.forces] if mechanism is not None else []
     counts = [law.turns for law in laws if isinstance(law, AngleTable)]
     if geared is not None and geared.gears:
-        from ballpass.derive.drive import known_drive
-        from ballpass.derive.mechanism.linkage import derive_linkage  # importing SymPy takes longer than reading
-
         with suppress(LinkageError):  # the derivation reports it
             counts.append(derive_linkage(geared, known_drive(geared.driver)).turns)
     if shaft is not None and shaft.speed.value != 0.0:

@@ -158,7 +158,7 @@ def check_path(scene: Scene, path: str) -> None:
     """
     known = [quantity.path for quantity in scene.quantities]
     if path not in known:
-        raise SceneError([_unknown_path(path, known)])
+        raise _unknown_path(path, known).error()
 
 
 def _unknown_path(path: str, known: Sequence[str]) -> Fault:
@@ -199,8 +199,11 @@ def replaced(record: Any, changed: Mapping[str, SceneNumber]) -> Any:
 def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
     if mechanism.driver.torque is not None:
         mechanism.driver.torque.check(checker)
-    if mechanism.driver.table is not None:
-        _check_speeds(checker, mechanism.driver)
+    if (table := mechanism.driver.table) is not None:
+        remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
+        speeds = (mechanism.driver.speed, *table.later_speed)
+        path = speeds[0].path.rpartition(".")[0].rpartition(".")[0]
+        checker.rows(path, {"time": table.time, "speed": speeds}, remedy)
     if (limits := mechanism.driver.range) is not None and limits.start.value >= limits.end.value:
         checker.fault(
             limits.end.path,
@@ -213,15 +216,6 @@ def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
         force.law.check(checker)
 
 
-def _check_speeds(checker: Checker, driver: Driver) -> None:
-    """As many times as speeds, two or more."""
-    table = driver.table
-    assert table is not None
-    remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
-    path = driver.speed.path.rpartition(".")[0].rpartition(".")[0]
-    checker.rows(path, {"time": table.time, "speed": (driver.speed, *table.later_speed)}, remedy)
-
-
 def _check_load(checker: Checker, load: Load) -> None:
     """Note faults of the numbers of a load."""
     if isinstance(load.law, TableLoad):
@@ -230,10 +224,6 @@ def _check_load(checker: Checker, load: Load) -> None:
         checker.rows(load.path, {table.over: table.rows, "x": table.x, "y": table.y}, remedy)
         if table.over == "angle":
             checker.within_a_turn(table.rows)
-    _check_windows(checker, load)
-
-
-def _check_windows(checker: Checker, load: Load) -> None:
     window = load.angle_window
     if window is not None and window.end is not None:
         checker.window(window.start, window.end)

@@ -158,11 +158,6 @@ class Key(ABC):
         return self.placeholder(table, name)
 
 
-def _single(key: QuantityKey) -> dict[str, Any]:
-    """Schema of one number of a list."""
-    return QuantityKey(unit=key.unit, bounds=key.bounds).schema()
-
-
 def _texts(value: object) -> bool:
     return isinstance(value, tuple) and all(isinstance(item, str) for item in value)
 
@@ -247,7 +242,7 @@ class PairKey(QuantityKey):
 
     def schema(self) -> dict[str, Any]:
         """A list of two."""
-        return {"type": "array", "items": _single(self), "minItems": 2, "maxItems": 2}
+        return {"type": "array", "items": QuantityKey.schema(self), "minItems": 2, "maxItems": 2}
 
     def absent(self, table: Table, name: str) -> Any:
         """Twice the default."""
@@ -283,7 +278,7 @@ class ColumnKey(QuantityKey):
         written = {"properties": {"values": numbers, "unit": unit}, "required": ["values", "unit"]}
         named = {"properties": {"file": unit, "column": unit, "unit": unit}, "required": ["file", "column"]}
         tables = [{"type": "object", **table, "additionalProperties": False} for table in (written, named)]
-        return {"anyOf": [{"type": "array", "items": _single(self), "minItems": 1}, *tables]}
+        return {"anyOf": [{"type": "array", "items": QuantityKey.schema(self), "minItems": 1}, *tables]}
 
     def placeholder(self, table: Table, name: str) -> Any:
         """No row."""
@@ -335,12 +330,9 @@ class WholeKey(Key):
         """The number."""
         if isinstance(given, int) and not isinstance(given, bool) and self.lowest <= given <= self.highest:
             return given
-        allowed, remedy = (
-            f"a whole number from {self.lowest} to {self.highest}",
-            f"write for example {name} = {self.sample}",
-        )
-        self.refuse(table, name, "this is not a whole number within the bounds", given, allowed, remedy)
-        return self.lowest
+        allowed = f"a whole number from {self.lowest} to {self.highest}"
+        remedy = f"write for example {name} = {self.sample}"
+        return int(self.refuse(table, name, "this is not a whole number within the bounds", given, allowed, remedy))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -138,6 +138,14 @@ def read_record(
     return kind(**{name: values[names[name]] for name in keys}, **known)
 
 
+def read_inner(
+    kind: type[Record], table: Table, key: str, example: str = "", fill: Fill = _NOTHING, **known: Any
+) -> Record:
+    """A record from the keys of the table at a key."""
+    with table.table(key, example) as inner:
+        return read_record(kind, inner, fill, **known)
+
+
 def choices_of(kind: type[Any], fill: Fill = _NOTHING) -> tuple[Either, ...]:
     """Rules of a record on which of its keys are given."""
     return tuple(rule.filled(fill) for rule in getattr(kind, "one_of", ()))

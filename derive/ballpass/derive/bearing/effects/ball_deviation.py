@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+
+import sympy as sp
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
@@ -12,9 +13,6 @@ from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import number
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 DEVIATION = number(
     "m",
@@ -57,8 +55,6 @@ class BallDeviation(Effect):
         return BallEffect(kind=self.name, parts=tuple(deviations))
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
-        import sympy as sp
-
         return -sum((ball.only(one.ball, symbol_of(one.size)) for one in effect.parts), start=sp.S.Zero)
 
     def describe(self, effect: BallEffect) -> str:

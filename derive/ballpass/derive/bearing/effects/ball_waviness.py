@@ -7,16 +7,13 @@ the amplitude, and nothing of odd ones, which only move the ball.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sympy as sp
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.bearing.effects.read_waves import ORDERS, Wave, read_waves, wave_tables, with_roughness
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 #: Table of waves that all balls have alike.
 EACH = "each"
@@ -45,8 +42,6 @@ class BallWaviness(Effect):
         return True
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
-        import sympy as sp
-
         assert ball.spin is not None  # `spins`
         thicker: dict[str, sp.Expr] = {}
         for wave in effect.parts:

@@ -18,7 +18,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+
+import sympy as sp
 
 from ballpass.derive.bearing.contact_direction import contact_cosine
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Passing
@@ -33,9 +34,6 @@ from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input, gate_of
 from ballpass.runtime.contract.manifest import TurningInfo
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 PROFILES = ("rectangular", "half-sine", "path")
 PLACES = ("outer", "inner", "ball")
@@ -117,8 +115,6 @@ class Defects(Effect):
         return any(spall.on == "ball" for spall in effect.parts)
 
     def edges(self, effect: BallEffect, bearing: Bearing, names: Names, passes: Passing) -> OverAngle:
-        import sympy as sp
-
         several = [one for spall in effect.parts for one in _contacts(spall, bearing, names)]
         if passes.turnings is not None:
             gates = (gate for one in several for gate in one.gates(passes.turnings))
@@ -136,8 +132,6 @@ class Defects(Effect):
         return tuple(d for one in contacts for d in one.constants())
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
-        import sympy as sp
-
         taken = sp.S.Zero
         for spall in effect.parts:
             for one in _contacts(spall, bearing, names):
@@ -239,8 +233,6 @@ class _SpallContact:
             yield f"{self.names.prefix}defects.{self._label}{part}", words, window
 
     def _gate(self, part: str) -> sp.Symbol:
-        import sympy as sp
-
         return sp.Symbol(f"gate.{self.names.prefix}defects.{self._label}{part}", real=True)
 
     @property
@@ -252,8 +244,6 @@ class _SpallContact:
 
     def constants(self) -> Iterator[Definition]:
         """Half angle, and the edges of the windows: of a raceway's spall times the number of balls."""
-        import sympy as sp
-
         spall, define, balls = self.spall, self.names.define, sp.Integer(self.bearing.balls)
         ball, raceway = self._radii
         own = ball if spall.on == "ball" else raceway
@@ -290,8 +280,6 @@ class _SpallContact:
 
     def depth(self, c: sp.Expr, s: sp.Expr, near: sp.logic.boolalg.Boolean) -> sp.Expr:
         """How deep a ball sinks, over cosine and sine of the angle past the middle."""
-        import sympy as sp
-
         half, one_half = self._symbol("half_angle"), sp.Rational(1, 2)
         across, along = sp.sin(half), sp.cos(half)
         depth = sp.S.Zero if self.spall.depth is None else symbol_of(self.spall.depth)
@@ -312,8 +300,6 @@ class _SpallContact:
 
     def _about_edge(self, cosine: sp.Expr, sine: sp.Expr) -> sp.Expr:
         """How deep a ball sinks that touches the edge, over cosine and sine of the angle past it."""
-        import sympy as sp
-
         ball, raceway = self._radii
         own, other = (ball, raceway) if self.spall.on == "ball" else (raceway, ball)
         aside = sp.sqrt(other**2 - (own * sine) ** 2)
@@ -323,8 +309,6 @@ class _SpallContact:
 
 
 def _contacts(spall: Spall, bearing: Bearing, names: Names) -> Iterator[_SpallContact]:
-    import sympy as sp
-
     angle = symbol_of(spall.angle)
     rings = [("outer", sp.S.Zero), ("inner", sp.pi)] if spall.on == "ball" else [(spall.on, sp.S.Zero)]
     for ring, opposite in rings:

@@ -6,16 +6,13 @@ added to its deflection.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sympy as sp
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.bearing.effects.read_waves import read_waves, wave_tables
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 
 class _RacewayWaviness(Effect):
@@ -27,8 +24,6 @@ class _RacewayWaviness(Effect):
         return BallEffect(kind=self.name, parts=tuple(waves))
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
-        import sympy as sp
-
         angle = ball.on_outer if self.ring == "outer" else ball.on_inner
         return -sum(
             (symbol_of(w.amplitude) * sp.cos(w.order * angle + symbol_of(w.phase)) for w in effect.parts),

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.bearing.elements import hertz
 from ballpass.derive.bearing.elements.element import RollingElement, compliance, raceway_radius, scaled
-from ballpass.derive.scene.bearing_records import GivenContact, HertzContact
-from ballpass.derive.scene.designations import GROOVES
+from ballpass.derive.scene.bearing_records import Bearing, GivenContact, HertzContact
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.designations import GROOVES, BearingType
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.units import QuantityError, parse_quantity
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Words
-
-if TYPE_CHECKING:
-    from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.derive.scene.checker import Checker
-    from ballpass.derive.scene.designations import BearingType
-    from ballpass.derive.scene.quantity import SceneNumber
 
 
 class Ball(RollingElement):

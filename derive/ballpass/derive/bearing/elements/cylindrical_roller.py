@@ -10,20 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import sympy as sp
 
 from ballpass.derive.bearing.elements.element import RollingElement, compliance, raceway_radius
-from ballpass.derive.scene.bearing_records import Material, smoothing_key
+from ballpass.derive.scene.bearing_records import Bearing, Material, smoothing_key
+from ballpass.derive.scene.designations import BearingType
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import positive
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Words
-
-if TYPE_CHECKING:
-    from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.derive.scene.designations import BearingType
 
 #: Approach of a steel roller and a raceway over Q^0.9/l^0.8, in m, N, m; and the compliance of that steel [1/Pa].
 APPROACH = sp.Rational(384, 10**10) * sp.Integer(1000) ** sp.Rational(-4, 5)

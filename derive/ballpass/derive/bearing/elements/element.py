@@ -10,22 +10,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import sympy as sp
 
 from ballpass.derive.bearing.contact_direction import contact_cosine
-from ballpass.derive.scene.bearing_records import Material
-from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.read_keys import Either, keys_of, read_record
+from ballpass.derive.scene.bearing_records import Bearing, Material
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.designations import BearingType
+from ballpass.derive.scene.keys import Fill, filled
+from ballpass.derive.scene.read_keys import Either, keys_of, read_inner, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Words
-
-if TYPE_CHECKING:
-    from ballpass.derive.scene.bearing_records import Bearing
-    from ballpass.derive.scene.checker import Checker
-    from ballpass.derive.scene.designations import BearingType
 
 #: What placeholders in the keys of materials stand for.
 RINGS: Fill = MappingProxyType({"PART": "rings", "_OF": ""})
@@ -56,7 +53,7 @@ class RollingElement:
     @property
     def stiffness_unit(self) -> str:
         """Unit of the stiffness factor."""
-        return self._in_unit("N/m^1.5")
+        return filled("N/m^1.5", self.fill)
 
     @property
     def element_material(self) -> Fill:
@@ -81,8 +78,8 @@ class RollingElement:
             contact.missing = contact.missing or not chosen
             own = None
             if contact.has("ball_material"):
-                with contact.table("ball_material", "young_modulus and poisson_ratio") as material:
-                    own = read_record(Material, material, self.element_material)
+                example = "young_modulus and poisson_ratio"
+                own = read_inner(Material, contact, "ball_material", example, self.element_material)
             return read_record(self.derived, contact, ring=read_record(Material, contact, RINGS), ball=own)
 
     def fill_contact(self, ball_diameter: object, kind: BearingType) -> Mapping[str, object]:
@@ -133,11 +130,6 @@ class RollingElement:
         factor = names.constant(f"k_{ring[0]}")
         words = f"Approach of {{}} with the {ring} ring"
         return "approach", (force / factor) ** (1 / self.exponent), "m", words
-
-    def _in_unit(self, text: str) -> str:
-        for old, new in self.fill.items():
-            text = text.replace(old, new)
-        return text
 
 
 def compliance(contact: Any) -> sp.Expr:

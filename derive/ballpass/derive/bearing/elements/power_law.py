@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import sympy as sp
 
 from ballpass.derive.bearing.elements.element import RollingElement
-from ballpass.derive.scene.bearing_records import smoothing_key
+from ballpass.derive.scene.bearing_records import Bearing, smoothing_key
 from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
-from ballpass.derive.scene.read_keys import positive, quantity, read_record
+from ballpass.derive.scene.read_keys import positive, quantity, read_inner
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
-
-if TYPE_CHECKING:
-    from ballpass.derive.scene.bearing_records import Bearing
 
 _WHEN = 'required with `element = "power-law"`'
 
@@ -73,8 +70,7 @@ class PowerLaw(RollingElement):
     contact_words = "force, deflection and exponent"
 
     def read_contact(self, table: Table) -> Any:
-        with table.table("contact", self.contact_words) as contact:
-            return read_record(PowerLawContact, contact)
+        return read_inner(PowerLawContact, table, "contact", self.contact_words)
 
     def stiffness(self, bearing: Bearing, names: Names) -> list[Definition]:
         """k_b, that of the chord from no load to the reference deflection."""

@@ -51,8 +51,12 @@ class Contact:
         return sp.diff(self.force(z), z).subs(z, delta)
 
     def gate(self, delta: sp.Expr) -> sp.Expr:
-        """1 while the ball touches both raceways, else 0."""
-        return _step(delta, self.width)
+        """1 while the ball touches both raceways, else 0; twice continuously differentiable where it is smoothed."""
+        if self.width is None:
+            return sp.Piecewise((1, delta > 0), (0, True))
+        v = _within(delta, self.width)
+        step = v**3 * (6 * v**2 - 15 * v + 10)
+        return sp.Piecewise((1, delta > self.width), (step, delta > -self.width), (0, True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,11 +77,3 @@ class SmoothedRest:
 def _within(value: sp.Expr, width: sp.Expr) -> sp.Expr:
     """v, from 0 to 1 across the width."""
     return (1 + value / width) / 2
-
-
-def _step(value: sp.Expr, width: sp.Expr | None) -> sp.Expr:
-    """1 where `value` is positive; twice continuously differentiable where it is smoothed within `width`."""
-    if width is None:
-        return sp.Piecewise((1, value > 0), (0, True))
-    v = _within(value, width)
-    return sp.Piecewise((1, value > width), (v**3 * (6 * v**2 - 15 * v + 10), value > -width), (0, True))

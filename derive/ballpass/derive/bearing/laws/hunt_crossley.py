@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+import sympy as sp
+
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds
 from ballpass.derive.scene.read_keys import Either, number
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class HuntCrossley(DampingLaw):

@@ -9,18 +9,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+import sympy as sp
+
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.scene.keys import Fill, QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import Either, number, read_keys
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import check_unit
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class DampingLaw(ABC):

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+import sympy as sp
+
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.laws.law import DampingLaw
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class NoDamping(DampingLaw):

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sympy as sp
 
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.laws.law import ViscousLaw
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class OneSidedGated(ViscousLaw):

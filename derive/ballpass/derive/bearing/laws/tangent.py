@@ -7,16 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+import sympy as sp
+
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.scene.quantity import NOT_NEGATIVE
 from ballpass.derive.scene.read_keys import number
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class Tangent(DampingLaw):

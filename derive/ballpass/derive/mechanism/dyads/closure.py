@@ -87,13 +87,9 @@ def turn_by_span(ledger: Ledger, body: str, vector: Pair, span: Pair, length: sp
     return name_turn(ledger, body, cos, sin, subscript(body))
 
 
-def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> Pair:
-    """Name the right-hand side of the loop closure's derivative."""
-    return ledger.name_pair(
-        f"joint.{inner.name}.closure",
-        order,
-        gap,
-        unit,
-        f"component of the {'velocity' if order == 'v' else 'acceleration'} that closes the loop at {inner.name}",
-        rf"\delta {order}_{{{subscript(inner.name)},AXIS}}",
-    )
+def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair) -> Pair:
+    """Name the right-hand side of the loop closure's first ("v") or second ("a") derivative."""
+    what, unit = {"v": ("velocity", "m/s"), "a": ("acceleration", "m/s^2")}[order]
+    words = f"component of the {what} that closes the loop at {inner.name}"
+    latex = rf"\delta {order}_{{{subscript(inner.name)},AXIS}}"
+    return ledger.name_pair(f"joint.{inner.name}.closure", order, gap, unit, words, latex)

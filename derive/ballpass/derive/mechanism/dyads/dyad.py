@@ -17,7 +17,7 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Balance, Guide, Mesh
+from ballpass.derive.mechanism.balance import Balance, Guide, JointAction
 from ballpass.derive.mechanism.kinematics import Ledger, Motion, Play, Pose, displaced, joint_point, name_joint
 from ballpass.derive.mechanism.vectors import Pair
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
@@ -61,7 +61,7 @@ class Group(ABC):
         """Bodies and points on the axes of two wheels in mesh, and the first one's share of their distance."""
         return None
 
-    def meshing(self, placement: Placement) -> Mesh | None:
+    def meshing(self, placement: Placement) -> JointAction | None:
         """A contact of the bodies that is no joint of the mechanism."""
         return None
 
@@ -161,7 +161,7 @@ class Placement:
 
     dyad: Group
     poses: tuple[Pose, ...]
-    spans: tuple[Pair, ...]
+    spans: tuple[Pair, ...] = ()
     determinant: sp.Expr
     margin: Margin
     guides: tuple[Guide, ...] = ()

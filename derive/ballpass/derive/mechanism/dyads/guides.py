@@ -8,7 +8,7 @@ import sympy as sp
 
 from ballpass.derive.mechanism.dyads.dyad import Margin
 from ballpass.derive.mechanism.kinematics import Ledger, Motion, Pose, joint_point
-from ballpass.derive.mechanism.vectors import Pair, add, cross, quarter_turn, scale, subtract
+from ballpass.derive.mechanism.vectors import Pair, add, cross, quarter_turn, scale, subtract, unit
 from ballpass.derive.scene.mechanism_records import Joint, Mechanism
 from ballpass.derive.terms import subscript, symbol_of
 
@@ -16,8 +16,7 @@ from ballpass.derive.terms import subscript, symbol_of
 def guide_axis(guide: Joint) -> Pair:
     """Unit vector of a guide in the axes of its bodies."""
     assert guide.direction is not None  # a prismatic joint has a direction
-    angle = symbol_of(guide.direction)
-    return sp.cos(angle), sp.sin(angle)
+    return unit(symbol_of(guide.direction))
 
 
 def name_direction(ledger: Ledger, guide: Joint, direction: Pair) -> Pair:

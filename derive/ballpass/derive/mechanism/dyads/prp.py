@@ -65,14 +65,14 @@ class PRP(Dyad):
             for path, travel, direction, host in zip(paths, travels, (one, two), hosts, strict=True)
         ]
         ends = fellows[0], self.closing(fellows[1], play)
-        gap = name_gap(ledger, inner, "v", subtract(ends[1].velocity, ends[0].velocity), "m/s")
+        gap = name_gap(ledger, inner, "v", subtract(ends[1].velocity, ends[0].velocity))
         speeds = name_travels(ledger, both, "speed", gap, -determinant)
         turned = [
             scale(2 * host.rate * speed, quarter_turn(direction))
             for host, speed, direction in zip(hosts, speeds, (one, two), strict=True)
         ]
         closure = subtract(subtract(ends[1].acceleration, ends[0].acceleration), subtract(turned[0], turned[1]))
-        gap = name_gap(ledger, inner, "a", closure, "m/s^2")
+        gap = name_gap(ledger, inner, "a", closure)
         accelerations = name_travels(ledger, both, "acceleration", gap, -determinant)
 
         motion = name_joint(ledger, inner, slid(fellows[0], hosts[0].rate, one, speeds[0], accelerations[0]))
@@ -84,7 +84,6 @@ class PRP(Dyad):
         return Placement(
             dyad=self,
             poses=(first, second),
-            spans=(),
             determinant=determinant,
             guides=tuple(
                 Guide(joint=guide, host=host.body, slider=body, direction=direction, travel=travel)

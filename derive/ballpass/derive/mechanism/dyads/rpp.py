@@ -64,12 +64,10 @@ class RPP(Dyad):
         moved = subtract(hinge.position, path.position)
         travels = name_travels(ledger, both, "", moved, determinant)
         fellow = carried(path, moved, host.rate, host.acceleration)
-        gap = name_gap(ledger, slot, "v", subtract(hinge.velocity, fellow.velocity), "m/s")
+        gap = name_gap(ledger, slot, "v", subtract(hinge.velocity, fellow.velocity))
         speeds = name_travels(ledger, both, "speed", gap, determinant)
         coriolis = scale(2 * host.rate, quarter_turn(gap))
-        gap = name_gap(
-            ledger, slot, "a", subtract(subtract(hinge.acceleration, fellow.acceleration), coriolis), "m/s^2"
-        )
+        gap = name_gap(ledger, slot, "a", subtract(subtract(hinge.acceleration, fellow.acceleration), coriolis))
         accelerations = name_travels(ledger, both, "acceleration", gap, determinant)
 
         under = host.motion(joint_point(mechanism, guide_joint, host.body))
@@ -83,7 +81,6 @@ class RPP(Dyad):
                 place(ledger, mechanism, block, host, pin, hinge),
                 place(ledger, mechanism, yoke, host, foot, anchor),
             ),
-            spans=(),
             determinant=determinant,
             guides=(
                 Guide(joint=slot, host=yoke, slider=block, direction=along, travel=travels[0]),

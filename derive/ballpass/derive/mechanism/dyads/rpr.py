@@ -73,7 +73,7 @@ class RPR(Dyad):
         travel = name_travel(ledger, guide, second, "", reach - dot(axis, between))
 
         # d differentiated: w J d + s' t = r; cross product with t and scalar product with d.
-        gap = name_gap(ledger, guide, "v", subtract(hinges[1].velocity, hinges[0].velocity), "m/s")
+        gap = name_gap(ledger, guide, "v", subtract(hinges[1].velocity, hinges[0].velocity))
         rate = name_rate(ledger, first, cross(direction, gap) / reach)
         speed = name_travel(ledger, guide, second, "speed", dot(span, gap) / reach)
         closure = add(
@@ -81,7 +81,7 @@ class RPR(Dyad):
             scale(rate**2, span),
             scale(-2 * rate * speed, quarter_turn(direction)),
         )
-        gap = name_gap(ledger, guide, "a", closure, "m/s^2")
+        gap = name_gap(ledger, guide, "a", closure)
         acceleration = name_acceleration(ledger, first, cross(direction, gap) / reach)
 
         turn = Turn(cos=cos, sin=sin, rate=rate, acceleration=acceleration)

@@ -79,13 +79,13 @@ class RRP(Dyad):
         # P + v = base + s t, differentiated: w J v − s' t = r; cross product with t and scalar product with v.
         fellow = carried(path, scale(travel, direction), host.rate, host.acceleration)
         closing = self.closing(fellow, play)
-        gap = name_gap(ledger, inner, "v", subtract(closing.velocity, hinge.velocity), "m/s")
+        gap = name_gap(ledger, inner, "v", subtract(closing.velocity, hinge.velocity))
         rate = name_rate(ledger, rod, cross(direction, gap) / reach)
         speed = name_travel(ledger, guide_joint, slider, "speed", -dot(v, gap) / reach)
         # Seen from the frame, the slider has the host's acceleration, Coriolis' and its own along the guide.
         coriolis = scale(2 * host.rate * speed, normal)
         closure = add(subtract(add(closing.acceleration, coriolis), hinge.acceleration), scale(rate**2, v))
-        gap = name_gap(ledger, inner, "a", closure, "m/s^2")
+        gap = name_gap(ledger, inner, "a", closure)
         acceleration = name_acceleration(ledger, rod, cross(direction, gap) / reach)
         quickening = name_travel(ledger, guide_joint, slider, "acceleration", -dot(v, gap) / reach)
         joint_motion = name_joint(ledger, inner, slid(fellow, host.rate, direction, speed, quickening))

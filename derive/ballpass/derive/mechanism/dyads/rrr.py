@@ -80,7 +80,7 @@ class RRR(Dyad):
         ]
 
         # P1 + v1 = P2 + v2, differentiated: w1 J v1 − w2 J v2 = r; scalar products with v2 and v1 give one rate each.
-        gap = name_gap(ledger, inner, "v", subtract(ends[1].velocity, ends[0].velocity), "m/s")
+        gap = name_gap(ledger, inner, "v", subtract(ends[1].velocity, ends[0].velocity))
         rates = [
             name_rate(ledger, body, dot(gap, other) / determinant) for body, other in zip(bodies, (v2, v1), strict=True)
         ]
@@ -89,7 +89,7 @@ class RRR(Dyad):
             scale(rates[0] ** 2, v1),
             scale(-(rates[1] ** 2), v2),
         )
-        gap = name_gap(ledger, inner, "a", difference_of_accelerations, "m/s^2")
+        gap = name_gap(ledger, inner, "a", difference_of_accelerations)
         accelerations = [
             name_acceleration(ledger, body, dot(gap, other) / determinant)
             for body, other in zip(bodies, (v2, v1), strict=True)

@@ -22,7 +22,7 @@ from ballpass.derive.mechanism.forces.windows import Windows
 __all__ = [
     "FORCE_TABLES",
     "BodyTorque",
-    "Constant",
+    "ConstantForce",
     "ForceTable",
     "Forces",
     "Friction",

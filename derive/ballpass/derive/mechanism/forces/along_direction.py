@@ -10,12 +10,11 @@ import sympy as sp
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point
-from ballpass.derive.mechanism.vectors import cross, dot, scale, subtract
+from ballpass.derive.mechanism.vectors import cross, dot, scale, subtract, unit
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import quantity
-from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import subscript, symbol_of
 from ballpass.derive.variables import Output
 
@@ -44,9 +43,8 @@ class AlongDirection(Pathway):
         places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
         poses = [setting.linkage.pose(body) for body in self.bodies]
         one, two = (pose.motion(place) for pose, place in zip(poses, places, strict=True))
-        angle, wall = symbol_of(self.direction), poses[0]
-        words = f"the point of {force.name} from its wall"
-        along = wall.rotate((sp.cos(angle), sp.sin(angle)))
+        wall, words = poses[0], f"the point of {force.name} from its wall"
+        along = wall.rotate(unit(symbol_of(self.direction)))
         along = ledger.name_pair(
             f"{label}.normal", "", along, "1", f"component of the normal of {force.name}", f"n_{{{mark},AXIS}}"
         )
@@ -60,13 +58,11 @@ class AlongDirection(Pathway):
 
         def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
-            both = (
-                AppliedLoad(
-                    body=self.bodies[0], at=self.points[0], point=places[0], force=pull, torque=cross(line, pull)
-                ),
-                AppliedLoad(body=self.bodies[1], at=self.points[1], point=places[1], force=scale(sp.Integer(-1), pull)),
+            (one, other), (at, end), back = self.bodies, self.points, scale(sp.Integer(-1), pull)
+            return (
+                AppliedLoad(body=one, at=at, point=places[0], force=pull, torque=cross(line, pull)),
+                AppliedLoad(body=other, at=end, point=places[1], force=back),
             )
-            return tuple(load for load in both if load.body != FRAME)
 
         rate = dot(along, subtract(two.velocity, one.velocity)) + wall.rate * cross(along, line)
         return Action(loads=loads, excess=lambda free: distance - free, rate=rate)

@@ -12,7 +12,7 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill, WholeKey
 from ballpass.derive.scene.mechanism_records import Force
 from ballpass.derive.scene.quantity import SceneNumber
-from ballpass.derive.scene.read_keys import column, read_record
+from ballpass.derive.scene.read_keys import column, read_inner
 from ballpass.derive.scene.table import Table
 
 #: A cycle of more turns is no machine's.
@@ -48,8 +48,7 @@ class AngleTable(Law):
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
         """Columns angle and force (or torque)."""
-        with data.table("table", f"angle and {fill['COLUMN']}") as table:
-            return read_record(cls, table, fill)
+        return read_inner(cls, data, "table", f"angle and {fill['COLUMN']}", fill)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The table's value."""

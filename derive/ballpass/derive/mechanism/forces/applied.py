@@ -14,6 +14,7 @@ from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.mechanism_records import Force, Mechanism
+from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import refuse_kinks
 from ballpass.derive.variables import Output, Terms
 
@@ -41,7 +42,8 @@ def derive_forces(linkage: Linkage) -> Forces:
     for force in linkage.mechanism.forces:
         known, said = len(setting.ledger.definitions), len(setting.smoothness)
         action = force.pathway.act(force, setting)
-        loads[force.label] = action.loads(force.law.amount(force, action, setting))
+        both = action.loads(force.law.amount(force, action, setting))
+        loads[force.label] = tuple(load for load in both if load.body != FRAME)
         refuse_kinks(
             f'The {force.word} "{force.name}"',
             sp.Tuple(

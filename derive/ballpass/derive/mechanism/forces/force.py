@@ -81,7 +81,7 @@ class Action:
 
     Attributes
     ----------
-    loads : on the bodies, by an amount
+    loads : on the bodies, by an amount; what acts on the frame is left out later
     excess : of the pathway's size over a free one [m] or [rad]; None where the pathway has no size
     rate : of the size [m/s] or [rad/s]
     """

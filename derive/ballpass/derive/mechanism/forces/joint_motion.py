@@ -13,7 +13,6 @@ from ballpass.derive.mechanism.vectors import dot, scale, subtract
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.mechanism_records import Force, Joint
-from ballpass.derive.scene.table import FRAME
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,9 +69,7 @@ class JointTurn(JointMotion):
         one, two = (setting.linkage.pose(body) for body in joint.bodies)
         return Action(
             loads=lambda torque: tuple(
-                AppliedLoad(body=body, torque=on)
-                for body, on in zip(joint.bodies, (torque, -torque), strict=True)
-                if body != FRAME
+                AppliedLoad(body=body, torque=on) for body, on in zip(joint.bodies, (torque, -torque), strict=True)
             ),
             rate=two.rate - one.rate,
         )
@@ -98,7 +95,6 @@ class JointTravel(JointMotion):
             loads=lambda force: tuple(
                 AppliedLoad(body=body, point=place, force=scale(on, guide.direction))
                 for body, place, on in zip(joint.bodies, places, (force, -force), strict=True)
-                if body != FRAME
             ),
             rate=dot(guide.direction, subtract(two.velocity, one.velocity)),
         )

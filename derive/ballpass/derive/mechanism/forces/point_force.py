@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import sympy as sp
-
 from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point
-from ballpass.derive.mechanism.vectors import Pair, scale
+from ballpass.derive.mechanism.vectors import Pair, scale, unit
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.mechanism_records import Force
@@ -49,10 +47,7 @@ class PointForce(Pathway):
 
     def vector(self, force: Force, setting: Setting) -> Pair:
         """The force, or the direction alone."""
-        if self.direction is None:
-            return components(self.force)
-        angle = symbol_of(self.direction)
-        return sp.cos(angle), sp.sin(angle)
+        return components(self.force) if self.direction is None else unit(symbol_of(self.direction))
 
     def words(self) -> str:
         """Force and point."""

@@ -68,10 +68,8 @@ class SpringDamper(Law):
             terms.append(symbol_of(self.stiffness) * excess)
             if self.cubic_stiffness is not None:
                 terms.append(symbol_of(self.cubic_stiffness) * excess**3)
-            stored, words = (
-                sp.integrate(sp.Add(*terms), excess),
-                f"Potential energy of {force.name}, 0 at its free {size}",
-            )
+            words = f"Potential energy of {force.name}, 0 at its free {size}"
+            stored = sp.integrate(sp.Add(*terms), excess)
             setting.requested.append(Output(name=f"{label}.energy", expression=stored, unit="J", description=words))
         if self.damping is not None:
             rate = ledger.define(

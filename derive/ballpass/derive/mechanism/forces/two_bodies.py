@@ -14,7 +14,6 @@ from ballpass.derive.mechanism.swing import Average, followed, nearest
 from ballpass.derive.mechanism.vectors import Pair, cross, dot, rotate
 from ballpass.derive.scene.body_keys import BODIES
 from ballpass.derive.scene.mechanism_records import Force
-from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import defined, subscript, symbol_of
 from ballpass.runtime.contract.manifest import UsualInfo
 
@@ -45,7 +44,7 @@ class TwoBodies(Pathway):
 
         def loads(torque: sp.Expr) -> tuple[AppliedLoad, ...]:
             signed = zip(self.bodies, (torque, -torque), strict=True)
-            return tuple(AppliedLoad(body=body, torque=on) for body, on in signed if body != FRAME)
+            return tuple(AppliedLoad(body=body, torque=on) for body, on in signed)
 
         return Action(loads=loads, excess=excess, rate=two.rate - one.rate)
 

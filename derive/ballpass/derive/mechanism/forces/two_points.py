@@ -14,7 +14,6 @@ from ballpass.derive.mechanism.vectors import dot, scale, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.mechanism_records import Force, Mechanism
-from ballpass.derive.scene.table import FRAME
 from ballpass.derive.terms import subscript
 from ballpass.derive.variables import Output
 
@@ -47,11 +46,7 @@ class TwoPoints(Pathway):
         def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
             ends = zip(self.bodies, self.points, places, (pull, scale(sp.Integer(-1), pull)), strict=True)
-            return tuple(
-                AppliedLoad(body=body, at=name, point=place, force=on)
-                for body, name, place, on in ends
-                if body != FRAME
-            )
+            return tuple(AppliedLoad(body=body, at=name, point=place, force=on) for body, name, place, on in ends)
 
         return Action(loads=loads, excess=lambda free: length - free, rate=rate)
 

@@ -15,7 +15,7 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.mechanism_records import Driver, Force
 from ballpass.derive.scene.quantity import SceneNumber, UsualRange
-from ballpass.derive.scene.read_keys import positive, quantity, read_record
+from ballpass.derive.scene.read_keys import positive, quantity, read_inner
 from ballpass.derive.scene.table import Table, upright
 from ballpass.derive.terms import defined
 from ballpass.runtime.contract.manifest import UsualInfo
@@ -67,8 +67,7 @@ class Windows(Law):
         """A table with start and end, or a list of them."""
         given = data.data["window"]
         if not isinstance(given, list):
-            with data.table("window", "start and end") as table:
-                return cls(windows=(read_record(Window, table, fill),))
+            return cls(windows=(read_inner(Window, data, "window", "start and end", fill),))
         if not given:
             data.fault(
                 "window",
@@ -82,9 +81,8 @@ class Windows(Law):
         )
         windows = []
         for number in numbered.data:
-            with numbered.table(number, "start and end") as table:
-                place = {"PLACE": f"the window {number} of {fill['NAME']}", "INDEX": f"{fill['INDEX']},{number}"}
-                windows.append(read_record(Window, table, place))
+            place = {"PLACE": f"the window {number} of {fill['NAME']}", "INDEX": f"{fill['INDEX']},{number}"}
+            windows.append(read_inner(Window, numbered, number, "start and end", place))
         return cls(windows=tuple(windows))
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
