@@ -90,19 +90,20 @@ def find_compiler(command: str | None = None) -> Compiler | None:
     return None
 
 
-def need_compiler(what: str) -> Compiler:
+def need_compiler(what: str, command: str | None = None) -> Compiler:
     """The compiler to use, as `find_compiler`.
 
     Parameters
     ----------
     what : what needs one, in words
+    command : as for `find_compiler`
 
     Raises
     ------
     RequestError
         There is none.
     """
-    found = find_compiler()
+    found = find_compiler(command)
     if found is None:
         raise RequestError(without_compiler(what))
     return found
