@@ -521,7 +521,7 @@ def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
 
 
 def without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("compilers", "compile", "functions", "loaded_model"):
+    for module in ("compilers", "compile", "loaded_model"):
         monkeypatch.setattr(f"ballpass.runtime.native.{module}.find_compiler", lambda command=None: None)
 
 

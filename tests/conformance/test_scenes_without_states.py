@@ -317,7 +317,7 @@ def test_without_a_compiler_it_answers_too(
     ballpass: Callable[..., Result], scenes: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     """Nothing is integrated, so that no stepper is needed."""
-    for module in ("compilers", "compile", "functions", "loaded_model"):
+    for module in ("compilers", "compile", "loaded_model"):
         monkeypatch.setattr(f"ballpass.runtime.native.{module}.find_compiler", lambda command=None: None)
     _said(_asked(ballpass, command, "slider_crank", ANSWERED[command]), 0)
 

@@ -82,9 +82,9 @@ class Check:
     """
 
     route: str
-    value: float | None
-    uncertainty: float | None
-    disagreement: float | None
+    value: float | None = None
+    uncertainty: float | None = None
+    disagreement: float | None = None
     verdict: Verdict
     reason: str = ""
     quantum: float | None = None
@@ -99,14 +99,7 @@ class Check:
 
 
 #: The check that was turned off.
-UNCHECKED = Check(
-    route="none",
-    value=None,
-    uncertainty=None,
-    disagreement=None,
-    verdict=Verdict.NOT_CHECKED,
-    reason="the check was turned off",
-)
+UNCHECKED = Check(route="none", verdict=Verdict.NOT_CHECKED, reason="the check was turned off")
 
 
 def compare(
@@ -137,7 +130,6 @@ def compare(
             route=route,
             value=second if fine else None,
             uncertainty=uncertainty if fine else None,
-            disagreement=None,
             verdict=Verdict.DISAGREES if fine else Verdict.NOT_CHECKED,
             reason=why,
         )

@@ -34,8 +34,15 @@ Array = NDArray[np.float64]
 ROUGHNESS = 0.3
 
 
-class MemberRuns:
-    """Quantities of runs with changed parameters.
+def member_runs(
+    run: Run,
+    request: Request,
+    quantities: Sequence[Quantity],
+    *,
+    fine: str,
+    progress: Callable[[float], None],
+) -> Callable[[Sequence[Mapping[str, float]]], Array]:
+    """A function that gives the values of all quantities for each of some changes; NaN where one cannot be simulated.
 
     Parameters
     ----------
@@ -45,39 +52,27 @@ class MemberRuns:
     fine : method for tight runs
     progress : called with the finished part of each call
     """
+    afar = [item for item in quantities if not _is_near(run, item)]
+    along = QuantityRun(run.model, quantities, rough=ROUGHNESS * ROUGH, along_nodes=afar)
+    tight = replace(request, method=fine, rtol=DIFFERENCE_RTOL, kinks=LOCATED, progress=None)
 
-    def __init__(
-        self,
-        run: Run,
-        request: Request,
-        quantities: Sequence[Quantity],
-        *,
-        fine: str,
-        progress: Callable[[float], None] = lambda _done: None,
-    ) -> None:
-        self._run, self._request, self._progress = run, request, progress
-        self._count, self._method = len(quantities), fine
-        afar = [item for item in quantities if not _is_near(run, item)]
-        self._quantities = QuantityRun(run.model, quantities, rough=ROUGHNESS * ROUGH, along_nodes=afar)
+    def measured(change: Mapping[str, float]) -> Array:
+        try:
+            one = resolve(run.model, neighbour(run.model, run.numbers, change), tight)
+            # the magnitudes of the run itself: a tolerance that changes with the parameters is noise
+            return along.measure(replace(one, magnitude=run.magnitude)).values
+        except (RequestError, SimulationError):
+            return np.full(len(quantities), np.nan)
 
-    def __call__(self, changes: Sequence[Mapping[str, float]]) -> Array:
-        """Values of all quantities for each change; NaN where it cannot be simulated."""
-        found = np.empty((len(changes), self._count))
+    def measure(changes: Sequence[Mapping[str, float]]) -> Array:
+        found = np.empty((len(changes), len(quantities)))
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            for k, one in enumerate(threads.map(self._measured, changes)):
-                found[k] = one
-                self._progress((k + 1) / len(changes))
+            for k, values in enumerate(threads.map(measured, changes)):
+                found[k] = values
+                progress((k + 1) / len(changes))
         return found
 
-    def _measured(self, change: Mapping[str, float]) -> Array:
-        model = self._run.model
-        request = replace(self._request, method=self._method, rtol=DIFFERENCE_RTOL, kinks=LOCATED, progress=None)
-        try:
-            run = resolve(model, neighbour(model, self._run.numbers, change), request)
-            # the magnitudes of the run itself: a tolerance that changes with the parameters is noise
-            return self._quantities.measure(replace(run, magnitude=self._run.magnitude)).values
-        except (RequestError, SimulationError):
-            return np.full(self._count, np.nan)
+    return measure
 
 
 def _is_near(run: Run, quantity: Quantity) -> bool:

@@ -46,7 +46,7 @@ class MethodChoice:
         """
         initial = run.initial.copy()
         initial[: len(initial) // 2] += moved
-        return quantities.measure(replace(run.by(self.method, self.rtol, self.kinks), initial=initial))
+        return quantities.measure(replace(run, method=self.method, rtol=self.rtol, kinks=self.kinks, initial=initial))
 
 
 def stepper_run(model: LoadedModel, numbers: Numbers, request: Request) -> Run:

@@ -30,11 +30,11 @@ from ballpass.runtime.certify.certificate import (
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
 from ballpass.runtime.certify.dimensions import BASES, Identity, identities, power
 from ballpass.runtime.certify.grazing import Grazing, find_grazing
-from ballpass.runtime.certify.member_runs import MemberRuns
+from ballpass.runtime.certify.member_runs import member_runs
 from ballpass.runtime.certify.sensitivity_report import STEPS, Sensitivity, SensitivityReport
 from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, parameters_named, real
+from ballpass.runtime.contract.parameters import Numbers, parameters_named
 from ballpass.runtime.contract.units import ratio_unit
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import DEFLECTION
@@ -45,8 +45,8 @@ from ballpass.runtime.quantity.records import Estimate, Quantity
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.request.direction_scales import ANGLE
-from ballpass.runtime.request.locating import check_kinks, refuse_jumps
-from ballpass.runtime.request.request import Request, asked_length, tolerance
+from ballpass.runtime.request.locating import refuse_jumps
+from ballpass.runtime.request.request import Request, asked_length
 from ballpass.runtime.request.resolve import Run, asked_transient
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import TURN, past
@@ -68,7 +68,7 @@ START_SHARE = 1e-2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Query:
-    """The request; None takes the scene's run settings, or this module's defaults.
+    """The request; None takes the scene's run settings.
 
     Attributes
     ----------
@@ -82,8 +82,8 @@ class Query:
     progress : called with words and a finished fraction
     """
 
-    of: Sequence[str] | None
-    wrt: Sequence[str] | None
+    of: str | Sequence[str] | None
+    wrt: str | Sequence[str] | None
     request: Request
     method: str = "auto"
     check: bool = True
@@ -106,48 +106,6 @@ def length_request(
     """
     turns, time = asked_length(model, cycles, duration)
     return Request(cycles=turns, duration=time, transient_cycles=asked_transient(model, transient))
-
-
-def make_query(
-    model: LoadedModel,
-    *,
-    of: str | Sequence[str] | None,
-    wrt: str | Sequence[str] | None,
-    cycles: float | None,
-    duration: float | None,
-    transient: float | None,
-    method: str,
-    check: bool,
-    rtol: float | None,
-    sensitivity_rtol: float | None,
-    kinks: str | None,
-    agreement: float | None,
-    progress: Callable[[str, float], None] | None,
-) -> Query:
-    """A query from what `Model.sensitivity` is given.
-
-    Raises
-    ------
-    RequestError
-        A wrong request.
-    """
-    for name, given in (("rtol", rtol), ("sensitivity_rtol", sensitivity_rtol)):
-        if given is not None:
-            tolerance(name, given)
-    if agreement is not None and not 0.0 < real(agreement) < 1.0:
-        raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
-    return Query(
-        of=[of] if isinstance(of, str) else of,
-        wrt=[wrt] if isinstance(wrt, str) else wrt,
-        request=length_request(model, cycles, duration, transient),
-        method=method,
-        check=check,
-        rtol=DERIVATIVE_RTOL if rtol is None else rtol,
-        sensitivity_rtol=DERIVATIVE_RTOL if sensitivity_rtol is None else sensitivity_rtol,
-        kinks=None if kinks is None else check_kinks(kinks),
-        agreement=AGREEMENT if agreement is None else agreement,
-        progress=progress,
-    )
 
 
 def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityReport:
@@ -185,7 +143,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     second = None
     if query.check:
         tell("checking", 0.0)
-        members = MemberRuns(run, query.request, quantities, fine=fine, progress=partial(tell, "checking"))
+        members = member_runs(run, query.request, quantities, fine=fine, progress=partial(tell, "checking"))
         second = by_differences(
             members,
             {name: numbers.parameters[name] for name in names},
@@ -266,8 +224,8 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     )
 
 
-def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
-    names = list(dict.fromkeys(default if given is None else given))
+def _listed(option: str, given: str | Sequence[str] | None, default: Sequence[str]) -> list[str]:
+    names = [given] if isinstance(given, str) else list(dict.fromkeys(default if given is None else given))
     if not names:
         raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
     return names

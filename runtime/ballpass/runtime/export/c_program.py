@@ -12,7 +12,6 @@ parameters can be changed on its command line and the numbers are those of the m
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -97,10 +96,7 @@ def export_c(
     for other in others:
         progress(f"compiling for {other}; the first time takes a minute or two, for zig's own libraries")
         program = f"{_program(manifest)}-{other}{TARGETS[other].program}"
-        with tempfile.TemporaryDirectory() as made:
-            for name, text in texts.items():
-                (Path(made) / name).write_text(text, encoding="utf-8", newline="\n")
-            replace_file(target / program, cross_compiled(Path(made), other, PROGRAM_FLAGS, sources, program))
+        replace_file(target / program, cross_compiled(texts, other, PROGRAM_FLAGS, sources, program))
         (target / program).chmod(0o755)
     return target
 

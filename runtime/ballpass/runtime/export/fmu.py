@@ -16,7 +16,6 @@ import platform
 import re
 import struct
 import sys
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -37,9 +36,9 @@ from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
 from ballpass.runtime.export.fmi2_description import fmi2_description
 from ballpass.runtime.export.model_description import SPEED, build_description, experiment, model_description
 from ballpass.runtime.export.scene_numbers import MOMENT, behind, computed_outputs, filled, speed_table, varying
-from ballpass.runtime.export.targets import TARGETS, cross_compiled, targets_of
+from ballpass.runtime.export.targets import TARGETS, compiled, cross_compiled, targets_of
 from ballpass.runtime.native.compile import library_suffix
-from ballpass.runtime.native.compilers import need_compiler, run_compiler
+from ballpass.runtime.native.compilers import need_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.functions import directional
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -252,25 +251,20 @@ def _binaries(
     """Shared libraries by their paths in the FMU: for any processor of this machine's kind, and for other kinds."""
     compiler = need_compiler("An FMU, which holds compiled code,")
     names, found, here = _units_of(sources), dict[str, bytes](), platform_tuple()
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        for name, text in sources.items():
-            (place / name).write_text(text, encoding="utf-8", newline="\n")
-        made = f"{identifier}{library_suffix()}"
-        own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
-        command = (*compiler.command, *LIBRARY_FLAGS, *names, *own, "-o", made, "-lm")
-        run_compiler(command, place, " ".join(command))
-        found[f"{here}/{made}"] = (place / made).read_bytes()
-        for other in targets:
-            target = TARGETS[other]
-            if target.place == here:
-                continue
-            progress(f"compiling for {other}; the first time takes a minute or two, for zig's own libraries")
-            made = f"{identifier}{target.library}"
-            flags = [flag for flag in LIBRARY_FLAGS if flag != "-fPIC" or target.library != ".dll"]
-            flags += ["-s"]  # without the paths of files here
-            flags += ["-Wl,-Bsymbolic"] if target.library == ".so" else []
-            found[f"{target.place}/{made}"] = cross_compiled(place, other, flags, names, made)
+    made = f"{identifier}{library_suffix()}"
+    own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
+    command = (*compiler.command, *LIBRARY_FLAGS, *names, *own, "-o", made, "-lm")
+    found[f"{here}/{made}"] = compiled(command, " ".join(command), sources, made)
+    for other in targets:
+        target = TARGETS[other]
+        if target.place == here:
+            continue
+        progress(f"compiling for {other}; the first time takes a minute or two, for zig's own libraries")
+        made = f"{identifier}{target.library}"
+        flags = [flag for flag in LIBRARY_FLAGS if flag != "-fPIC" or target.library != ".dll"]
+        flags += ["-s"]  # without the paths of files here
+        flags += ["-Wl,-Bsymbolic"] if target.library == ".so" else []
+        found[f"{target.place}/{made}"] = cross_compiled(sources, other, flags, names, made)
     if version == 3:
         return {f"binaries/{path}": content for path, content in found.items()}
     macos = f"{identifier}.dylib"

@@ -19,7 +19,7 @@ from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.dependencies import Dependencies
 from ballpass.runtime.export.scene_numbers import computed_outputs, speed_table, varying
-from ballpass.runtime.time.timeline import driver, stretch
+from ballpass.runtime.time.timeline import driver, speed_name, stretch
 
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"
@@ -168,7 +168,7 @@ def _variables(
         if output.size > 1:
             Xml.SubElement(variable, "Dimension", start=str(output.size))
     if SPEED in inputs:
-        start = repr(initial_speed(manifest))
+        start = repr(next(info.default for info in manifest.parameters if info.name == speed_name(manifest)))
         text = "Speed of the driver: at first that of the start, then the one at the end of the coming step"
         add(SPEED, "rad/s", text, causality="input", variability="continuous", start=start)
     return references
@@ -195,12 +195,6 @@ def _structure(
             add(kind, name, known.running[name], (*speeds, *times))
     for name in (*states, *rates, *computed):
         add("InitialUnknown", name, known.initial[name], times)
-
-
-def initial_speed(manifest: Manifest) -> float:
-    """Speed of the driver at t = 0 in the scene [rad/s]."""
-    assert manifest.mechanism is not None  # it has the driver
-    return next(info.default for info in manifest.parameters if manifest.mechanism.speed == info.name)
 
 
 def build_description(identifier: str, sources: Iterable[str]) -> Xml.Element:

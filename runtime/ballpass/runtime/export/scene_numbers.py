@@ -271,12 +271,8 @@ def behind(what: str, function: casadi.Function, name: str, given: Sequence[tupl
 
 def _string(text: str) -> str:
     """C string literal; all but plain ASCII as octal escapes."""
-    out = []
-    for byte in text.encode():
-        character = chr(byte)
-        plain = 32 <= byte < 127 and character not in '"\\?'
-        out.append(character if plain else f"\\{byte:03o}")
-    return '"' + "".join(out) + '"'
+    plain = {byte for byte in range(32, 127) if chr(byte) not in '"\\?'}
+    return '"' + "".join(chr(byte) if byte in plain else f"\\{byte:03o}" for byte in text.encode()) + '"'
 
 
 def _bound(bound: float | None, none: str) -> str:

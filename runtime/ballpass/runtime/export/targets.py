@@ -1,11 +1,12 @@
 """Kinds of machines that programs and FMUs are compiled for, by ziglang, from any one.
 
-In: sources in a folder, a kind.  Out: a program or shared library of them.
+In: texts of sources, a kind.  Out: a program or shared library of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,11 +58,14 @@ def targets_of(asked: Sequence[str]) -> list[str]:
     return [known for known in TARGETS if known in asked or known.partition("-")[0] in asked]
 
 
-def cross_compiled(folder: Path, target: str, flags: Sequence[str], sources: Sequence[str], name: str) -> bytes:
-    """What the C files of a folder are compiled to, for a kind of machines.
+def cross_compiled(
+    texts: Mapping[str, str], target: str, flags: Sequence[str], sources: Sequence[str], name: str
+) -> bytes:
+    """What C files are compiled to, for a kind of machines.
 
     Parameters
     ----------
+    texts : of the files, by name
     name : of the file that is made
 
     Raises
@@ -70,5 +74,19 @@ def cross_compiled(folder: Path, target: str, flags: Sequence[str], sources: Seq
         The compiler failed.
     """
     command = ("-target", TARGETS[target].triple, *flags, *sources, "-o", name, "-lm")
-    run_compiler((*ZIG, *command), folder, " ".join(("python -m ziglang cc", *command)))
-    return (folder / name).read_bytes()
+    return compiled((*ZIG, *command), " ".join(("python -m ziglang cc", *command)), texts, name)
+
+
+def compiled(command: tuple[str, ...], shown: str, texts: Mapping[str, str], name: str) -> bytes:
+    """What a compiler makes of C files in a folder of their own; else as for `cross_compiled`.
+
+    Parameters
+    ----------
+    shown : the command as a user may repeat it
+    """
+    with tempfile.TemporaryDirectory(prefix="ballpass-") as made:
+        folder = Path(made)
+        for file, text in texts.items():
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+        run_compiler(command, folder, shown)
+        return (folder / name).read_bytes()

@@ -5,15 +5,13 @@ In: a generated folder's model.  Out: bytes of the module.  ``ballpass.h`` is it
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import casadi
 
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.export.c_program import PROGRAM_ONLY, program_texts
 from ballpass.runtime.export.scene_numbers import MOMENT, STANDALONE, behind, moment_symbols
-from ballpass.runtime.native.compilers import ZIG, need_zig, run_compiler
+from ballpass.runtime.export.targets import compiled
+from ballpass.runtime.native.compilers import ZIG, need_zig
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import REDUCTION_TABLES, reduction_tables
@@ -61,14 +59,10 @@ def web_assembly(model: LoadedModel) -> bytes:
     texts[REDUCTION_TABLES] = reduction_tables()
     texts["drawn.c"] = behind("What a page draws", _drawn(symbolic), "scene_drawn", MOMENT, "y")
     texts["ratings.c"] = behind("Ratings of the bearings", _ratings(symbolic), "scene_ratings", MOMENT[-2:], "y")
-    with tempfile.TemporaryDirectory(prefix="ballpass-") as name:
-        folder = Path(name)
-        for file, text in texts.items():
-            (folder / file).write_text(text, encoding="utf-8", newline="\n")
-        sources = sorted(file for file in texts if file.endswith(".c"))
-        command = (*ZIG, *_FLAGS, *sources, "-o", "model.wasm")
-        run_compiler(command, folder, " ".join(("python -m ziglang cc", *_FLAGS, *sources, "-o model.wasm")))
-        return (folder / "model.wasm").read_bytes()
+    sources = sorted(file for file in texts if file.endswith(".c"))
+    command = (*ZIG, *_FLAGS, *sources, "-o", "model.wasm")
+    shown = " ".join(("python -m ziglang cc", *_FLAGS, *sources, "-o model.wasm"))
+    return compiled(command, shown, texts, "model.wasm")
 
 
 def drawn_columns(manifest: Manifest) -> tuple[int, int, int, int]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Spans
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.reduction_rows import is_void, void_moment
+from ballpass.runtime.native.reduction_rows import void_moment
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.request.locating import Kinks
 from ballpass.runtime.request.resolve import Run
@@ -98,10 +98,10 @@ class Work:
     reducing: bool
     end: np.ndarray
     rows: np.ndarray
-    results: dict[int, MemberFailure]
-    counts: dict[str, int]
     stop: ctypes.c_int
     magnitude: np.ndarray | None = None
+    results: dict[int, MemberFailure] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTS, 0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,9 +118,7 @@ def chunk_size(members: int, lanes: int) -> int:
     return min(CHUNK, max(1, -(-wanted // lanes)) * lanes)
 
 
-def run_chunks(
-    work: Work, able: np.ndarray, size: int, threads: int, progress: Callable[[float], None] | None = None
-) -> bool:
+def run_chunks(work: Work, able: np.ndarray, size: int, threads: int, progress: Callable[[float], None]) -> bool:
     """Let threads work through the chunks.
 
     Parameters
@@ -148,8 +146,7 @@ def run_chunks(
                     _add(work.counts, future.result())
                     chunk = pending.pop(future)
                     chunk.reached[:] = work.span.durations[chunk.members]
-                if progress is not None:
-                    progress(float(np.sum(np.minimum(reached / durations, 1.0))) / len(able))
+                progress(float(np.sum(np.minimum(reached / durations, 1.0))) / len(able))
         except BaseException as fault:
             work.stop.value = 1
             for future, chunk in pending.items():
@@ -254,8 +251,7 @@ def in_lanes(work: Work, chunk: Chunk) -> dict[str, int]:
             status, message = ending.name, f"{ending.value} Step size {result['step']:.3g} s{state}."
         note_failure(work, member, status, message, float(result["time"]))
     if rows is not None:
-        void = is_void(work.model.manifest, {name: all_[which] for name, all_ in work.members.columns.items()}, rows)
-        for place in np.flatnonzero(void & (results["status"] == End.DONE)).tolist():
+        for place in np.flatnonzero(results["status"] == End.DONE).tolist():
             member = int(which[place])
             values = {name: float(all_[member]) for name, all_ in work.members.columns.items()}
             if found := void_moment(work.model.manifest, values, rows[place]):

@@ -256,9 +256,8 @@ def _is_whole(group: Any, axes: SignalAxes, which: slice, places: Mapping[str, P
         if length != math.prod(array.chunks) * array.dtype.itemsize:
             return False
     status = group["status"][which] if "status" in lengths else np.array([UNFINISHED])
-    made = [*(name for name, _, _ in axes.outputs), *(["quantities"] if axes.quantities else [])]
-    made += [f"entry_time.{name}" for name in axes.driven]
-    wanted = made if np.any(status == MADE) else []
+    recorded = [name for name in places if name not in ("noise_rms", "failure", "status")]
+    wanted = recorded if np.any(status == MADE) else []
     # what holds nothing but zeros or empty words has no file
     wanted += ["noise_rms"] if wanted and np.any(np.isfinite(axes.snr[which])) else []
     wanted += ["failure"] if np.any(status == FAILED) else []

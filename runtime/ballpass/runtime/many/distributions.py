@@ -53,7 +53,10 @@ class Distribution:
         try:
             support = self._frozen().support()
         except TypeError as fault:
-            raise RequestError(f"{self.name}: {self._shown()}. {self._allowed()}.") from fault
+            shapes = ", ".join(shape_names(self.name)) or "no shape parameters"
+            raise RequestError(
+                f"{self.name}: {self._shown()}. Expected: {shapes}; loc and scale where wanted."
+            ) from fault
         if not support[0] <= support[1]:  # SciPy gives NaN
             raise RequestError(
                 f"{self.name}: {self._shown()} lie outside the domain of this distribution of scipy.stats. scale is "
@@ -63,15 +66,7 @@ class Distribution:
     def _shown(self) -> str:
         return "the arguments " + (", ".join(f"{key} = {value!r}" for key, value in self.arguments.items()) or "(none)")
 
-    def _allowed(self) -> str:
-        return f"Expected: {', '.join(shape_names(self.name)) or 'no shape parameters'}; loc and scale where wanted"
-
     def _frozen(self) -> Any:
-        shapes = shape_names(self.name)
-        unknown = [key for key in self.arguments if key not in (*shapes, "loc", "scale")]
-        missing = [key for key in shapes if key not in self.arguments]
-        if unknown or missing:
-            raise TypeError
         return _continuous(self.name)(**self.arguments)
 
     def values(self, quantiles: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import real, unknown_name, whole
 from ballpass.runtime.contract.units import printed_unit
-from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
+from ballpass.runtime.many.chunks import MemberFailure, Work, chunk_size, member_run, note_failure, run_chunks
 from ballpass.runtime.many.members import Members, Spans, Table, check_assembled_members, make_members, read_table
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
@@ -263,21 +263,18 @@ def simulate_many(
         reducing=bool(reduced),
         end=members.initial.copy(),
         rows=reduction_rows(manifest).empty(len(members), span.starts, reduced, tolerance),
-        results={
-            member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
-            for member, message in members.refused.items()
-        },
-        counts=dict.fromkeys(COUNTS, 0),
         stop=ctypes.c_int(0),
     )
+    for member, message in members.refused.items():
+        note_failure(work, member, "REFUSED", message)
     able = np.array([m for m in range(len(members)) if m not in members.refused], dtype=np.int_)
     lanes_of = driver.lanes if driver is not None and in_lanes else 1
     size = chunk_size(len(able), driver.lanes if driver is not None else 1)
     tell = progress or (lambda _done: None)
-    parts = [0.0, *([0.5] if by_steps and others else []), 1.0]  # of the progress
+    share = 0.5 if by_steps and others else 1.0  # of the progress
     interrupted, found = False, {}
     if by_steps:
-        interrupted = run_chunks(work, able, size, workers, lambda done: tell(done * parts[1]))
+        interrupted = run_chunks(work, able, size, workers, lambda done: tell(done * share))
         runs = ReducedRuns(manifest=manifest, rows=work.rows, end=work.end, values=members.columns)
         with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
             found = {item.name: np.array(_reduced(runs, item)) for item in by_steps}
@@ -286,9 +283,8 @@ def simulate_many(
     if others:
         table = np.full((len(members), len(others)), np.nan)
         if not interrupted:
-            first = parts[-2]
             interrupted = measure_members(
-                work, others, able, table, workers, lambda done: tell(first + done * (1.0 - first))
+                work, others, able, table, workers, lambda done: tell(1.0 - share + done * share)
             )
         found |= {item.name: table[:, k] for k, item in enumerate(others)}
     failed = sorted(work.results)

@@ -191,15 +191,6 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
             refused[member] = str(fault)
 
 
-def groups(rows: np.ndarray) -> list[np.ndarray]:
-    """Places of equal rows, each group in order."""
-    if not rows.shape[1]:
-        return [np.arange(len(rows))]
-    _, inverse = np.unique(rows, axis=0, return_inverse=True)
-    order = np.argsort(inverse.ravel(), kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(inverse.ravel()[order])) + 1)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spans:
     """How long each member runs.
@@ -234,16 +225,17 @@ def check_assembled_members(model: LoadedModel, members: Members, spans: Spans) 
         if name in function.name_in() and rows.shape[1]:
             used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
             parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
-    for group in groups(np.column_stack(parts)):
-        for member in group.tolist():
-            if member in members.refused:
-                continue
-            numbers = members.numbers(model, member)
-            try:
-                check_assembly(model, numbers, float(spans.durations[member]))
-                if valid_angles(model, numbers) is None:
-                    break
+    turning: set[bytes] = set()  # geometries that are valid at every angle
+    for member, geometry in enumerate(row.tobytes() for row in np.column_stack(parts)):
+        if member in members.refused or geometry in turning:
+            continue
+        numbers = members.numbers(model, member)
+        try:
+            check_assembly(model, numbers, float(spans.durations[member]))
+            if valid_angles(model, numbers) is None:
+                turning.add(geometry)
+            else:
                 locks = locks or timeline.is_free(model.manifest)
-            except RequestError as fault:
-                members.refused[member] = str(fault)
+        except RequestError as fault:
+            members.refused[member] = str(fault)
     return locks

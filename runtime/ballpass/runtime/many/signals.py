@@ -25,7 +25,7 @@ from ballpass.runtime.quantity.cuts import entering_times
 from ballpass.runtime.quantity.grammar import parse_quantities, quantities_of, refuse_unknown_kinds
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.ratings.of_bearing import bearing_words
-from ballpass.runtime.request.request import Request
+from ballpass.runtime.request.request import Request, no_output
 from ballpass.runtime.request.resolve import Run, resolve
 from ballpass.runtime.solution.integration_error import IntegrationError
 from ballpass.runtime.solution.simulate import simulate
@@ -249,8 +249,6 @@ def check_outputs(manifest: Manifest, signals: Signals, label: str, model: Loade
     RequestError
         All faults at once.
     """
-    from ballpass.runtime.request.request import no_output
-
     infos = {info.name: info for info in manifest.outputs}
     faults = []
     for name in signals.outputs:

@@ -16,15 +16,6 @@ from ballpass.runtime.time import timeline
 from ballpass.runtime.time.breakpoints import edge_times
 from ballpass.runtime.time.turning import Turning
 
-#: Names of the inputs of spalls.
-_GATE = "gate."
-
-
-def spalls_of(model: LoadedModel) -> tuple[str, ...]:
-    """Names of the spalls of a model, as ``defects.spall``."""
-    names = [item.name.removeprefix(_GATE) for item in model.manifest.inputs if item.kind == "gate"]
-    return tuple(name for name in names if "defects." in name)
-
 
 def driven_spalls(manifest: Manifest) -> dict[str, str]:
     """Spalls that balls enter when the motion decides, as ``defects.spall``, by what their edges begin with."""
@@ -50,22 +41,18 @@ def entry_times(
     By spall, increasing, shape (members, most entries of a member); NaN after the last one [s]
     """
     found: dict[str, np.ndarray] = {}
-    spalls = spalls_of(model)
-    if not spalls:
-        return found
-    columns = make_members(model, parameters, bounded=False).columns
-    for item in model.manifest.inputs:
-        name = item.name.removeprefix(_GATE)
-        if name not in spalls:
-            continue
+    gates = [item for item in model.manifest.inputs if item.kind == "gate" and "defects." in item.name]
+    columns = make_members(model, parameters, bounded=False).columns if gates else {}
+    for item in gates:
         used = timeline.names_of_input(model.manifest, item)
         members = [
             _entries(model.manifest, item, {key: float(columns[key][k]) for key in used}, begin, end)
             for k in range(len(columns[used[0]]))
         ]
-        found[name] = np.full((len(members), max(1, *map(len, members))), np.nan)
-        for row, times in zip(found[name], members, strict=True):
+        table = np.full((len(members), max(1, *map(len, members))), np.nan)
+        for row, times in zip(table, members, strict=True):
             row[: len(times)] = times
+        found[item.name.removeprefix("gate.")] = table
     return found
 
 

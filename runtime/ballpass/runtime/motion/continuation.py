@@ -125,14 +125,12 @@ class SteadyBranch:
     @property
     def contact_changes(self) -> tuple[tuple[BranchPoint, BranchPoint], ...]:
         """Neighbouring points between which the contact signature changes."""
-        pairs = zip(self.points, self.points[1:], strict=False)
-        return tuple((one, other) for one, other in pairs if not one.contacts.same(other.contacts))
+        return tuple(pair for pair in pairwise(self.points) if not pair[0].contacts.same(pair[1].contacts))
 
     @property
     def unlocated(self) -> tuple[tuple[BranchPoint, BranchPoint], ...]:
         """Neighbouring points between which multipliers pass the unit circle and no point was found where they do."""
-        pairs = zip(self.points, self.points[1:], strict=False)
-        return tuple((a, b) for a, b in pairs if not (a.kind or b.kind) and a.outside != b.outside)
+        return tuple((a, b) for a, b in pairwise(self.points) if not (a.kind or b.kind) and a.outside != b.outside)
 
 
 class _Found:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
 
@@ -61,7 +61,7 @@ class ForcingPeriod:
     turning: TurningInfo
     count: Fraction | float
     words: str
-    difference: float
+    difference: float = 0.0
 
     def time(self, values: Mapping[str, float]) -> float:
         """The period for these numbers of the model [s]."""
@@ -122,7 +122,7 @@ def forcing_period(
         driver = timeline.driver_info(model.manifest)
         if driver is None or _rate(driver, numbers.values) == 0.0:
             raise RequestError("turns: nothing turns in this scene. Leave it away.")
-        asked = ForcingPeriod(turning=driver, count=turns, words=f"{turns:g} turns, as asked for", difference=0.0)
+        asked = ForcingPeriod(turning=driver, count=turns, words=f"{turns:g} turns, as asked for")
         return _checked(model, numbers, times, states, asked)
     repetition = Repetition.of(model.manifest, numbers.values)
     among = _that_matter(model, numbers, times, states, repetition)
@@ -145,9 +145,7 @@ def forcing_period(
             _turned(info, several * period[info], alike) for info, alike in zip(among, parts, strict=True)
         )
         words = bearing_words(words, model.manifest.bearings)
-        found = _checked(
-            model, numbers, times, states, ForcingPeriod(turning=base, count=count, words=words, difference=0.0)
-        )
+        found = _checked(model, numbers, times, states, ForcingPeriod(turning=base, count=count, words=words))
         if found.difference <= SAME:
             return found
     raise RequestError(
@@ -252,7 +250,7 @@ def _checked(
     )
     largest = max(float(np.max(np.abs(first))), 1e-300)
     difference = float(np.max(np.abs(later - first))) / largest
-    return ForcingPeriod(turning=period.turning, count=period.count, words=period.words, difference=difference)
+    return replace(period, difference=difference)
 
 
 def _turned(info: TurningInfo, turns: Fraction, alike: Fraction) -> str:

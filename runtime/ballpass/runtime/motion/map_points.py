@@ -20,7 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.defaults import EXPONENT_RTOL, SECTION_RTOL
 from ballpass.runtime.contract.errors import SimulationError
-from ballpass.runtime.many.chunks import CHUNK, COUNTS, Chunk, Work, in_lanes, magnitudes
+from ballpass.runtime.many.chunks import CHUNK, Chunk, Work, in_lanes, magnitudes
 from ballpass.runtime.many.members import Members, Spans, make_members
 from ballpass.runtime.motion.forcing_period import ForcingPeriod
 from ballpass.runtime.motion.lyapunov import (
@@ -177,8 +177,6 @@ class _Returns:
             reducing=void,
             end=members.initial.copy(),
             rows=reduction_rows(self.model.manifest).empty(len(points), starts, (), rtol),
-            results={},
-            counts=dict.fromkeys(COUNTS, 0),
             stop=self.stop,
             magnitude=self.magnitude[points],
         )

@@ -5,6 +5,7 @@ In: motions at the points of a plane.  Out: `MotionMap`: its report, a table for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -79,34 +80,30 @@ class MotionMap(ShortRepr, Reported):
     def _report(self) -> Report:
         first, second = self.vary
         kinds, count = self.kinds, self.kinds.size
-        shares = [
-            (
-                kind,
-                str(np.count_nonzero(kinds == kind)),
-                f"{100.0 * np.mean(kinds == kind):.3g}",
-                self._span(kinds == kind),
-            )
-            for kind in kinds_in(kinds)
-        ]
-        heads = ("motion", "points", "% of points", "largest exponent per reading")[: 4 if self.exponents else 3]
+        columns: dict[str, Callable[[str], str]] = {
+            "motion": str,
+            ">points": lambda kind: str(np.count_nonzero(kinds == kind)),
+            ">% of points": lambda kind: f"{100.0 * np.mean(kinds == kind):.3g}",
+        }
+        if self.exponents:
+            columns["largest exponent per reading"] = lambda kind: self._span(kinds == kind)
         taken = self.motions.returns
         rate = f"; {taken[0]:.4g} periods integrated, {taken[0] / taken[1]:.2g} a second of a core" if taken[1] else ""
-        overall = ReportTable(
+        overall = ReportTable.of(
+            kinds_in(kinds),
+            columns,
             title=f"Motion over {first.name} and {second.name}, read {self.every}",
-            heads=heads,
-            rows=[row[: len(heads)] for row in shares],
-            right=heads[1:3],
             caption=f"{first.count} x {second.count} points, each from the scene's start{rate}",
         )
+        unit = printed_unit(first.shown_unit)
         places = np.unique(np.linspace(0, second.count - 1, min(ROWS, second.count)).round().astype(int))
-        along = ReportTable(
+        along = ReportTable.of(
+            places.tolist(),
+            {
+                f"{second.name}\n[{printed_unit(second.shown_unit)}]": lambda k: f"{second.shown[k]:.6g}",
+                f"~motions over {first.name} [{unit}]": lambda k: _regions(first, kinds[:, k]),
+            },
             title=f"Regions over {first.name}",
-            heads=(
-                f"{second.name}\n[{printed_unit(second.shown_unit)}]",
-                f"motions over {first.name} [{_unit(first)}]",
-            ),
-            rows=[(f"{second.shown[k]:.6g}", _regions(first, kinds[:, k])) for k in places.tolist()],
-            wrapped=(f"motions over {first.name} [{_unit(first)}]",),
         )
         said = [EXPONENT_WORDS] if self.exponents else []
         for words in dict.fromkeys(sorted(filter(None, self.motions.open.tolist()))):
@@ -195,10 +192,6 @@ def kinds_in(kinds: np.ndarray) -> list[str]:
     there = set(np.unique(kinds).tolist())
     periods = sorted(there.difference(_OTHERS), key=lambda kind: int(kind.split()[1]))
     return [*periods, *(kind for kind in _OTHERS if kind in there)]
-
-
-def _unit(vary: ParameterRange) -> str:
-    return printed_unit(vary.shown_unit)
 
 
 def _regions(vary: ParameterRange, kinds: np.ndarray) -> str:

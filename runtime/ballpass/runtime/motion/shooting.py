@@ -73,14 +73,12 @@ class PeriodicState:
     Attributes
     ----------
     nodes : states at the starts of the segments, the first at t = 0, shape (segments, states)
-    monodromy : derivative of the state after all periods by that at the start, shape (states, states)
-    multipliers : its eigenvalues, largest first
+    multipliers : eigenvalues of the derivative of the state after all periods by that at the start, largest first
     left : what is left, for each iteration, in shares of the states' magnitudes [1]
     periods : integrated in all
     """
 
     nodes: np.ndarray
-    monodromy: np.ndarray
     multipliers: np.ndarray
     left: tuple[float, ...]
     periods: int
@@ -148,6 +146,7 @@ class Shooting:
         model, count = self.model, nodes.shape[1]
         numbers = self.numbers(value)
         length = self.repeats * self.period.time(numbers.values)
+        begin, piece = self.begin(numbers), length / self.segments
         names = [*model.manifest.initial, *([self.over] if self.over else [])]
         first = later = 0.0
         if self.over:  # where the period is a function of the parameter, so are the ends of all segments
@@ -159,7 +158,10 @@ class Shooting:
         by_states = np.zeros((self.segments, count, self.segments, count))
         monodromy = np.eye(count)
         for k in range(self.segments):
-            request = self._request(nodes, k, numbers, rtol)
+            start = state_at(model, numbers, begin + k * piece, nodes[k])
+            request = Request(
+                duration=piece, initial=start, samples_per_cycle=1, outputs=[], rtol=rtol, progress=self.progress
+            )
             found = sensitivities(model, numbers, request, names, with_jumps=True)
             end, slopes = found.solution.x[-1], found.x[-1]
             flow, nxt = slopes[:, :count], (k + 1) % self.segments
@@ -167,7 +169,7 @@ class Shooting:
             by_states[k, :, k] += flow * self.magnitude / self.magnitude[:, None]
             by_states[k, :, nxt] -= np.eye(count)
             if self.over:
-                ends = [self.begin(numbers) + (k + j) * length / self.segments for j in (0, 1)]
+                ends = [begin + (k + j) * length / self.segments for j in (0, 1)]
                 rates = [
                     _rate(model, numbers, t, x, inside)
                     for t, x, inside in zip(ends, (nodes[k], end), (1.0, -1.0), strict=True)
@@ -177,14 +179,6 @@ class Shooting:
                 by_parameter[k] = by_value / self.magnitude
             monodromy = flow @ monodromy
         return left.ravel(), by_states.reshape(nodes.size, nodes.size), by_parameter.ravel(), monodromy
-
-    def _request(self, nodes: np.ndarray, k: int, numbers: Numbers, rtol: float | None) -> Request:
-        """A run over a segment."""
-        length = self.repeats * self.period.time(numbers.values) / self.segments
-        begin = state_at(self.model, numbers, self.begin(numbers) + k * length, nodes[k])
-        return Request(
-            duration=length, initial=begin, samples_per_cycle=1, outputs=[], rtol=rtol, progress=self.progress
-        )
 
     def solve(self, nodes: np.ndarray) -> PeriodicState:
         """Newton's iteration from these states, with shorter steps where a whole one lessens nothing.
@@ -215,7 +209,6 @@ class Shooting:
                     multipliers = np.linalg.eigvals(final.monodromy)
                     return PeriodicState(
                         nodes=nodes + step,
-                        monodromy=final.monodromy,
                         multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
                         left=(*left, final.size),
                         periods=runs * self.repeats,

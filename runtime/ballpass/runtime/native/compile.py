@@ -63,18 +63,12 @@ class CompiledLibrary:
 
     Attributes
     ----------
-    path : the file; its name carries `key`
-    key : sha256 of all that made it
-    compiler : identity of the compiler
+    path : the file; its name carries the key of all that made it
     cached : whether it was there already
-    seconds : time the compiler took, 0 when cached [s]
     """
 
     path: Path
-    key: str
-    compiler: str
     cached: bool
-    seconds: float
 
 
 def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None = None) -> CompiledLibrary | None:
@@ -147,14 +141,12 @@ def compile_sources(
     compiler = replace(compiler, flags=(*compiler.flags, *flags))
     contents = {path: _content(path, digests or {}) for path in (*sources, *headers)}
     contents |= {Path(name): text.encode() for name, text in (made_headers or {}).items()}
-    key = library_key(list(contents.values()), compiler)
-    name = f"{_file_name(label)}-{key[:32]}"
+    name = f"{_file_name(label)}-{library_key(list(contents.values()), compiler)[:32]}"
     ready = _find(cache_folder(), name)
     if ready is not None:
-        return CompiledLibrary(path=ready, key=key, compiler=compiler.identity, cached=True, seconds=0.0)
+        return CompiledLibrary(path=ready, cached=True)
     folder = _writable_cache_folder()
     _clear(folder)
-    started = time.perf_counter()
     with tempfile.TemporaryDirectory(
         dir=folder, prefix=f".{name}-", suffix=".tmp", ignore_cleanup_errors=True
     ) as temporary:
@@ -176,8 +168,7 @@ def compile_sources(
                 "another folder."
             ) from None
         _open(target, shown)
-    seconds = time.perf_counter() - started
-    return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
+    return CompiledLibrary(path=target, cached=False)
 
 
 def _content(path: Path, digests: Mapping[Path, str]) -> bytes:

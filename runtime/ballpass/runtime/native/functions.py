@@ -22,7 +22,7 @@ from ballpass.runtime.contract.options import Option, refuse_faults
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
-from ballpass.runtime.native.compilers import Compiler, find_compiler
+from ballpass.runtime.native.compilers import need_compiler
 from ballpass.runtime.native.kernel import Array, CompiledKernel, CompiledLoop, Loop, PointLoop
 
 #: Arguments of a function of outputs that change from sample to sample.
@@ -103,13 +103,13 @@ class CompiledFunctions:
     @typed
     def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
         """Function by name for many points at once; `varying` names the inputs that change between them."""
-        varying = tuple(varying)
         if (name, varying) not in self._own.loops:
             function = self.function(name)
             if self.library is None:
                 loop: PointLoop = Loop(function, varying)
             else:
-                loop = CompiledLoop(self._find_compiler("loop.c"), self._library(name).path, function, varying)
+                compiler = need_compiler("loop.c", self._compiler)
+                loop = CompiledLoop(compiler, self._library(name).path, function, varying)
             self._own.loops[name, varying] = loop
         return self._own.loops[name, varying]
 
@@ -183,20 +183,12 @@ class CompiledFunctions:
         where = self._where[name]
         with self._making:
             if where not in self._libraries:
-                compiler = self._find_compiler(f"{where}.c")
                 source, label = self.folder / f"{where}.c", f"{self.manifest.scene}_{where}"
+                compiler = need_compiler(source.name, self._compiler)
                 digests = digests_of(self.folder, self.manifest)
                 flags = ("-O0",) if source.stat().st_size > LARGE else ()
                 self._libraries[where] = compile_sources((source,), compiler, label=label, flags=flags, digests=digests)
             return self._libraries[where]
-
-    def _find_compiler(self, source: str) -> Compiler:
-        compiler = find_compiler(self._compiler)
-        if compiler is None:
-            raise CompileError(
-                f"{source}: the compiler that made the model is gone. Load the folder again to run without one."
-            )
-        return compiler
 
     def _external(self, name: str) -> casadi.Function:
         library = self._library(name)

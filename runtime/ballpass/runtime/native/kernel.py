@@ -53,7 +53,7 @@ class CompiledKernel:
         self._buffer, self.evaluate = buffer  # the first owns the memory the second works on
         self.inputs: dict[str, Array] = {}
         self.outputs: dict[str, Array] = {}
-        self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, Array] | None]] = {}
+        self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, ...] | None]] = {}
         for k, name in enumerate(function.name_in()):
             memory = np.zeros(_dense_rows(function, name, k))
             self.inputs[name] = memory
@@ -65,7 +65,8 @@ class CompiledKernel:
             self.outputs[name] = memory
             if memory.size:
                 self._buffer.set_res(k, memory.data)
-            self._patterns[name] = (sparsity.shape, None if sparsity.is_dense() else _positions(sparsity))
+            positions = None if sparsity.is_dense() else tuple(np.array(sparsity.get_triplet(), dtype=int))
+            self._patterns[name] = (sparsity.shape, positions)
 
     def __call__(self, values: Mapping[str, Any]) -> Array:
         """First output for the inputs in `values`; a copy, (rows,) or (rows, columns).  Other keys are ignored."""
@@ -256,8 +257,3 @@ def _addresses(arrays: Sequence[Array | None]) -> Any:
     return (ctypes.c_void_p * len(arrays))(
         *(None if array is None or not array.size else array.ctypes.data for array in arrays)
     )
-
-
-def _positions(sparsity: casadi.Sparsity) -> tuple[Array, Array]:
-    rows, columns = sparsity.get_triplet()
-    return np.array(rows, dtype=int), np.array(columns, dtype=int)

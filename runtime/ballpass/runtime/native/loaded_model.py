@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
+from ballpass.runtime.contract.errors import BallpassWarning, RequestError
 from ballpass.runtime.contract.manifest import Manifest, RunInfo
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.contract.refused_scenes import refuse_still
@@ -22,7 +22,6 @@ from ballpass.runtime.native.driver_library import (
     ENSEMBLE,
     LOCATING,
     PLAIN,
-    SWITCHES,
     DriverSources,
     compile_driver,
 )
@@ -125,27 +124,13 @@ class LoadedModel(CompiledFunctions):
 
     @property
     def locating_differentiating_stepper(self) -> Stepper:
-        """The same whose steps end on kinks of the laws; errors as for `locating_stepper`."""
-        return self._locating(DIFFERENTIATING_LOCATED)
+        """The same whose steps end on kinks of the laws."""
+        return self._driver(Stepper, DIFFERENTIATING_LOCATED)
 
     @property
     def locating_stepper(self) -> Stepper:
-        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`.
-
-        Raises
-        ------
-        ArtefactError
-            The folder does not say where the kinks are.
-        """
-        return self._locating(LOCATING)
-
-    def _locating(self, sources: DriverSources) -> Stepper:
-        if sources not in self._drivers and not (self.folder / SWITCHES).is_file():
-            raise ArtefactError(
-                f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
-                "`ballpass derive`, or leave kinks stepped-over."
-            )
-        return self._driver(Stepper, sources)
+        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`."""
+        return self._driver(Stepper, LOCATING)
 
     @property
     def ensemble_driver(self) -> EnsembleDriver:

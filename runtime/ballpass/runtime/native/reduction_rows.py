@@ -11,7 +11,7 @@ the power of the balls' loads that fatigue needs over this angle, for fatigue co
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TypeAlias
@@ -19,8 +19,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ballpass.runtime.contract.manifest import BearingInfo, Manifest
-from ballpass.runtime.ratings.result_limits import FLATTENED, void_words
+from ballpass.runtime.contract.manifest import Manifest
+from ballpass.runtime.ratings.result_limits import void_words
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -142,32 +142,14 @@ class ReductionRows:
         return rows
 
 
-def is_void(manifest: Manifest, values: Mapping[str, ArrayLike], rows: Array) -> NDArray[np.bool_]:
-    """Whether runs mean nothing, by their reductions, shape (runs,).
-
-    A ball is flattened by more than a tenth, or the rings are displaced by more than a ball.
-    """
-    void = np.zeros(len(rows), dtype=bool)
-    for bearing, deflection in _deflections(manifest, rows):
-        ball, clearance = (np.asarray(values[f"{bearing.path}.{key}"]) for key in ("ball_diameter", "clearance"))
-        void |= (deflection > FLATTENED * ball) | (deflection + clearance / 2.0 > ball)
-    return void
-
-
 def void_moment(manifest: Manifest, values: Mapping[str, float], row: Array) -> tuple[str, float] | None:
     """Why a run means nothing, and when its largest deflection is [s]; None where it is not void."""
-    layout = reduction_rows(manifest)
-    for bearing, (deflection,) in _deflections(manifest, row[None, :]):
-        if words := void_words(bearing, values, deflection):
-            return words, float(row[layout.columns["max_time", bearing.prefix + DEFLECTION]])
-    return None
-
-
-def _deflections(manifest: Manifest, rows: Array) -> Iterator[tuple[BearingInfo, Array]]:
-    """Of each bearing: largest deflection of a ball in each run [m]."""
-    layout = reduction_rows(manifest)
+    columns = reduction_rows(manifest).columns
     for bearing in manifest.bearings:
-        yield bearing, rows[:, layout.columns["max", bearing.prefix + DEFLECTION]]
+        channel = bearing.prefix + DEFLECTION
+        if words := void_words(bearing, values, float(row[columns["max", channel]])):
+            return words, float(row[columns["max_time", channel]])
+    return None
 
 
 @lru_cache(maxsize=1)

@@ -132,14 +132,14 @@ def _input(item: InputInfo, known: dict[str, ca.SX], model: LoadedModel, numbers
         return now + moved
     if item.kind in ("rate", "slope"):
         return rate if item.kind == "rate" else slope
-    piece = timeline.table_piece(manifest, item, values, t)
-    if piece.rows[0] == piece.rows[1]:
-        return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
-    (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))
+    rows, knots, argument = timeline.table_piece(manifest, item, values, t)
+    if rows[0] == rows[1]:
+        return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[rows[0]]]
+    (t0, t1), (y0, y1) = ([known[names[row]] for row in rows] for names in (item.times, item.values))
     # angles are counted beyond a turn; the added whole turns have no derivative
-    t0, t1 = (k + (v - values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True))
+    t0, t1 = (k + (v - values[item.times[r]]) for k, v, r in zip((t0, t1), knots, rows, strict=True))
     steepness = (y1 - y0) / (t1 - t0)
-    return steepness if item.kind == "table_rate" else y0 + steepness * (piece.argument + moved - t0)
+    return steepness if item.kind == "table_rate" else y0 + steepness * (argument + moved - t0)
 
 
 def _turned(

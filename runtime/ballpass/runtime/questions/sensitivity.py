@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Check, Cycles, Duration, Option, SensitivityRtol, TightRtol, Transient
+from ballpass.runtime.contract.parameters import real
 from ballpass.runtime.questions import option_names
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.show.progress import shown_steps
@@ -95,22 +98,21 @@ def sensitivity(
     >>> f"{pair.derivative:.2f} {pair.unit}, {pair.check.verdict.value}"
     '0.28 m/m, verified'
     """
-    from ballpass.runtime.certify.sensitivity_query import answer, make_query
+    from ballpass.runtime.certify.certificate import AGREEMENT
+    from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 
-    query = make_query(
-        model,
+    if agreement is not None and not 0.0 < real(agreement) < 1.0:
+        raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
+    query = Query(
         of=of,
         wrt=wrt,
-        cycles=cycles,
-        duration=duration,
-        transient=transient,
+        request=length_request(model, cycles, duration, transient),
         method=method,
         check=check,
-        rtol=rtol,
-        sensitivity_rtol=sensitivity_rtol,
+        rtol=DERIVATIVE_RTOL if rtol is None else rtol,
+        sensitivity_rtol=DERIVATIVE_RTOL if sensitivity_rtol is None else sensitivity_rtol,
         kinks=kinks,
-        agreement=agreement,
-        progress=None,
+        agreement=AGREEMENT if agreement is None else agreement,
     )
     numbers = model.numbers(parameters)
     with shown_steps("differentiating", progress) as tell:

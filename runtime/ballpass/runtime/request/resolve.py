@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,10 +84,6 @@ class Run:
     def tolerance(self) -> np.ndarray:
         """Error allowed in a step, shape (states,)."""
         return np.asarray(self.rtol * self.magnitude)
-
-    def by(self, method: str, rtol: float, kinks: Kinks) -> Run:
-        """The same run by another method of the stepper."""
-        return replace(self, method=method, rtol=rtol, kinks=kinks, reason="asked for")
 
     def check_steady(self) -> Run:
         """The run itself; RequestError as for `Span.check`."""

@@ -30,14 +30,14 @@ def integrate(run: Run, trajectory: Trajectory) -> None:
         trajectory.passed = len(trajectory.segments.inputs)
         return
     segments, stops = trajectory.segments, trajectory.stops
-    state = trajectory.initial.copy()
+    state = run.initial.copy()
     for k, u in enumerate(segments.inputs):
         given = np.concatenate([u, run.numbers.p, run.numbers.c])
         interval = (float(segments.times[k]), float(segments.times[k + 1]))
         trajectory.passed = k + 1
         state = _segment(run, trajectory, given, state, interval, (int(stops[k]), int(stops[k + 1])))
         if run.progress is not None:
-            run.progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
+            run.progress((interval[1] - run.begin) / run.duration)
 
 
 def _segment(

@@ -47,18 +47,6 @@ def brief_limit(duration: float, turn: float) -> int:
     return min(wanted, step_limit(duration, turn))
 
 
-def least_progress(duration: float, turn: float, part: float, steps: int) -> float:
-    """Least time that so many steps must cover [s].
-
-    Parameters
-    ----------
-    duration, turn : as for `step_limit` [s]
-    part : fraction of the run that is enough in any case
-    steps : accepted and rejected
-    """
-    return min(part * duration, steps * min(turn / STEPS_A_TURN, 1.0 / STEPS_A_SECOND))
-
-
 @dataclass(slots=True)
 class Allowance:
     """Steps that a run has left, and check of its progress.
@@ -92,5 +80,5 @@ class Allowance:
 
 def allowance(duration: float, turn: float, begin: float = 0.0, taken: int = 0) -> Allowance:
     """Budget of a run that has reached `begin` [s] in so many steps."""
-    least = least_progress(duration, turn, LEAST_PROGRESS, STEPS_A_LOOK)
+    least = min(LEAST_PROGRESS * duration, STEPS_A_LOOK * min(turn / STEPS_A_TURN, 1.0 / STEPS_A_SECOND))
     return Allowance(left=max(step_limit(duration, turn) - taken, 1), least=least, time=begin)

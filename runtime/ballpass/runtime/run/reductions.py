@@ -131,12 +131,7 @@ class Reductions(ShortRepr, Mapping[str, Reduction]):
     @staticmethod
     def from_facts(facts: Mapping[str, Any]) -> Reductions:
         """Reductions from what `dataclasses.asdict` gave of some."""
-        channels = {}
-        for name, entry in facts["channels"].items():
-            if "rms" in entry:  # of a file that holds it instead of the deviation
-                square = entry["rms"] ** 2 - entry["mean"] ** 2
-                entry = {key: value for key, value in entry.items() if key != "rms"} | {"std": max(square, 0.0) ** 0.5}
-            channels[name] = Reduction(**entry)
+        channels = {name: Reduction(**entry) for name, entry in facts["channels"].items()}
         return Reductions(**{**facts, "channels": channels})
 
 

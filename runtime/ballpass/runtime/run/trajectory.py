@@ -27,8 +27,6 @@ class Trajectory:
 
     Attributes
     ----------
-    begin, end : of the run [s]
-    initial : state at its begin, shape (states,)
     t : times of the samples, increasing, shape (samples,) [s]
     even : whether they are the ends of equal intervals of the whole run
     x : states there, shape (samples, states)
@@ -41,9 +39,6 @@ class Trajectory:
     steps, rejected : of the integration
     """
 
-    begin: float
-    end: float
-    initial: np.ndarray
     t: np.ndarray
     even: bool
     x: np.ndarray
@@ -73,9 +68,6 @@ def start_trajectory(run: Run, sampling: Sampling) -> Trajectory:
     stops = np.searchsorted(sampling.times, segments.times - near)
     stops[0], stops[-1] = 0, len(sampling.times)
     return Trajectory(
-        begin=run.begin,
-        end=run.end,
-        initial=run.initial,
         t=sampling.times,
         even=sampling.even,
         x=np.empty((len(sampling.times), len(run.initial))),

@@ -87,7 +87,7 @@ def simulate(
             _refuse_void(run, trajectory)
     except (RunFailed, Interrupted) as end:
         failure = end
-    last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial
+    last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else run.initial
     counted, before = (
         reductions_of(
             model.manifest,

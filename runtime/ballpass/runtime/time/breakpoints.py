@@ -6,7 +6,7 @@ In: a manifest and numbers.  Out: times, increasing, and which parameters move t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -28,16 +28,10 @@ def _rows(manifest: Manifest, values: Values) -> Iterator[np.ndarray]:
             yield knots(item.times, values)
 
 
-def breakpoints(
-    manifest: Manifest, values: Values, t0: float, t1: float, among: Iterable[InputInfo] | None = None
-) -> np.ndarray:
+def breakpoints(manifest: Manifest, values: Values, t0: float, t1: float) -> np.ndarray:
     """Times in the open interval (t0, t1) at which a gate switches or a table has a knot.
 
     A window of zero width and one of a turn or more never switch.
-
-    Parameters
-    ----------
-    among : inputs of the manifest.  Default: all
 
     Returns
     -------
@@ -49,12 +43,9 @@ def breakpoints(
         More than `turning.MOST_TURNS` turns.
     """
     found = [np.zeros(0), *_rows(manifest, values)]
-    for item in manifest.inputs if among is None else among:
-        if item.kind == "gate":
+    for item in manifest.inputs:
+        if item.kind == "gate" or (item.kind in ("table", "table_rate") and item.turning):
             found += [times for _, times in edge_times(manifest, item, values, t0, t1)]
-        elif item.kind in ("table", "table_rate") and item.turning:
-            turning = Turning.of(timeline.info_of(manifest, item), values)
-            found += [turning.passes(float(a), t0, t1, item.turns) for a in timeline.table_knots(item, values)[0]]
     return _apart(found, t0, t1)
 
 
@@ -73,14 +64,12 @@ def _apart(found: Sequence[np.ndarray], t0: float, t1: float) -> np.ndarray:
 
 
 def edge_times(
-    manifest: Manifest, gate: InputInfo, values: Values, t0: float, t1: float
+    manifest: Manifest, item: InputInfo, values: Values, t0: float, t1: float
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Parameters or constants that are edges of a gate's windows, and times in [t0, t1] at which it passes them [s]."""
-    turning = Turning.of(timeline.info_of(manifest, gate), values).times(gate.parts)
-    for names, (start, width) in zip(gate.windows, timeline.windows_of(gate, values), strict=True):
-        if 0.0 < width < TURN:
-            for name, edge in zip(names, (start, start + width), strict=True):
-                yield name, turning.passes(edge, t0, t1)
+    """Edges of windows or knots of a table over an angle, by name, and when they are passed in [t0, t1] [s]."""
+    turning = Turning.of(timeline.info_of(manifest, item), values).times(item.parts)
+    for name, edge in _edges(item, values):
+        yield name, turning.passes(edge, t0, t1, item.turns)
 
 
 def breakpoint_slopes(
@@ -135,7 +124,7 @@ def _rows_near(names: Sequence[str], values: Values, t: float) -> list[str]:
 
 def _edges(item: InputInfo, values: Values) -> Iterator[tuple[str, float]]:
     """Angles at which an input changes, by name: edges of windows that switch, knots of a table."""
-    if item.kind == "table":
+    if item.kind != "gate":
         yield from zip(item.times, timeline.table_knots(item, values)[0].tolist(), strict=True)
     else:
         for names, (start, width) in zip(item.windows, timeline.windows_of(item, values), strict=True):

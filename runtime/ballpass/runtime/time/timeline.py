@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -288,34 +287,24 @@ def info_of(manifest: Manifest, item: InputInfo) -> TurningInfo:
     return next(info for info in manifest.turnings if info.name == item.turning)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TablePiece:
-    """Piece of a table: its two rows (twice one where the table is flat), their knots, and the argument between them.
+def table_piece(
+    manifest: Manifest, item: InputInfo, values: Values, t: float
+) -> tuple[tuple[int, int], tuple[float, float], float]:
+    """Piece of a table that holds at a time: its rows, twice one where the table is flat, their knots, the argument.
 
-    Knots and argument are times [s], or angles [rad] counted on beyond a turn, so that they increase.
-    """
-
-    rows: tuple[int, int]
-    knots: tuple[float, float]
-    argument: float
-
-
-def table_piece(manifest: Manifest, item: InputInfo, values: Values, t: float) -> TablePiece:
-    """Piece of a table that holds at a time, and the argument there.
-
-    The rounding of a time that lies on a knot decides on which side it is.
+    Knots and argument are times [s], or angles [rad] counted on beyond a turn, so that they increase.  The rounding of
+    a time that lies on a knot decides on which side it is.
     """
     at, argument = table_knots(item, values)[0], t
     if item.turning:
         argument = at[0] + past(Turning.of(info_of(manifest, item), values).at(t)[0], at[0], item.turns)
         at = np.append(at, at[0] + item.turns * TURN)
     k = int(np.searchsorted(at, argument, side="right"))
-    last = len(item.times) - 1
     if not item.turning and k in (0, len(at)):
-        row = 0 if k == 0 else last
-        return TablePiece(rows=(row, row), knots=(float(at[row]),) * 2, argument=float(argument))
+        row = max(k - 1, 0)
+        return (row, row), (float(at[row]), float(at[row])), float(argument)
     rows = (k - 1, k % len(item.times) if item.turning else k)
-    return TablePiece(rows=rows, knots=(float(at[k - 1]), float(at[k])), argument=float(argument))
+    return rows, (float(at[k - 1]), float(at[k])), float(argument)
 
 
 def _table(
