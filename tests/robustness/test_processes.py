@@ -418,6 +418,25 @@ def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     assert not (tmp_path / "results").exists()
 
 
+def test_an_interrupt_while_the_compiler_starts_ends_it_too(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The system has started it and Python has not said so yet: a busy machine makes that long."""
+    begun: list[int] = []
+
+    class Slow(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *words: Any, **options: Any) -> None:
+            super().__init__(*words, **options)
+            begun.append(self.pid)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Slow)
+    with pytest.raises(KeyboardInterrupt):
+        compiling.compile_sources((source,), wrapper(tmp_path, "exec sleep 600"))
+    assert len(begun) == 1
+    assert gone(begun[0])
+
+
 def gone(process: int) -> bool:
     """Whether a process of ten minutes that is no child of this one has ended, or was ended and soon does."""
     for _ in range(2000):

@@ -14,9 +14,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import FrameType
 
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.contract.extras import INSTALL_COMPILER, WITHOUT_COMPILER, can_derive, is_installed
@@ -197,22 +200,42 @@ def _finish(command: tuple[str, ...], folder: Path | None, timeout: float) -> su
     A compiler is a driver that starts the real one: ending the driver alone leaves a child that holds the pipes, and
     reading them would wait for it.
     """
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        start_new_session=True,
-    )
+    process = None
     try:
+        with _interrupted_behind():
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                start_new_session=True,
+            )
         stdout, stderr = process.communicate(timeout=timeout)
     except BaseException:
-        _end(process)
+        if process is not None:
+            _end(process)
         raise
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+@contextlib.contextmanager
+def _interrupted_behind() -> Iterator[None]:
+    """An interrupt (Ctrl-C) within comes behind it: a process that has begun has a name then, by which it is ended."""
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda *what: heard.append(what))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if heard:
+        before(*heard[0])
 
 
 def _end(process: subprocess.Popen[str]) -> None:
