@@ -16,8 +16,7 @@ from ballpass.runtime.ask.observables import turns
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import force_components, table_direction
 from ballpass.runtime.contract.parameters import check_name
-from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
-from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
+from ballpass.runtime.quantity.characteristic import KinematicFrequencies, frequencies_of, mean_speeds
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
 from ballpass.runtime.request.ball_angles import ball_angles, ball_angles_along
 from ballpass.runtime.time import timeline
