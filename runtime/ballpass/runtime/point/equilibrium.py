@@ -183,6 +183,8 @@ class StaticEquilibrium(Reported):
         for name in names:
             if name in (*self.model.states, "states"):
                 raise RequestError(f"static equilibrium: {name!r} is found, not given. Differentiate by parameters.")
+        if of == RHS:
+            raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
         if len(self.free_directions):
             raise RequestError(
                 "static equilibrium: a ring is free to move along some direction, so that its place is not a function "
@@ -197,22 +199,11 @@ class StaticEquilibrium(Reported):
         half, held = len(self.coordinates), held_coordinates(self.model)
         moved[held] = 0.0
         slopes = np.linalg.solve(self.stiffness, moved)
-        if of == "positions":
-            slopes[held] = directions.x[:half][held]
-            total = slopes
-        else:
-            if of == RHS:
-                raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
-            parts = []
-            for rows in rows_of(self.model, of):
-                part = contract(self.model, rows, directions, there)
-                name = f"{rows.function}_jac_x"
-                if self.model.has(name):
-                    by_states = self.model.kernel(name)(there).reshape(-1, len(self.x))
-                    part += by_states[rows.indices, :half] @ slopes
-                parts.append(part)
-            total = np.concatenate(parts)
-        return np.asarray(total[:, 0] if isinstance(wrt, str) else total)
+        slopes[held] = directions.x[:half][held]
+        if of != "positions":  # the rings move along
+            moving = replace(directions, x=np.vstack([slopes, directions.x[half:]]))
+            slopes = np.concatenate([contract(self.model, rows, moving, there) for rows in rows_of(self.model, of)])
+        return np.asarray(slopes[:, 0] if isinstance(wrt, str) else slopes)
 
 
 def _with_driver(model: LoadedModel, numbers: Numbers, t: float, names: Sequence[str]) -> JacobianDirections:
