@@ -59,12 +59,9 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     '12.79 kN'
     """
     element, geometry = rated_element(bearing), geometry_of(bearing, values)
-    taken = bearing.catalogue
-    dynamic = None if taken is None else taken.dynamic_rating
-    static = None if taken is None else taken.static_rating
-    limit = None if taken is None else taken.fatigue_limit
-    numbers = {"dynamic_rating": dynamic, "static_rating": static, "fatigue_limit": limit}
-    given = tuple(name for name, value in numbers.items() if value is not None)
+    names = ("dynamic_rating", "static_rating", "fatigue_limit")
+    dynamic, static, limit = (getattr(bearing.catalogue, name, None) for name in names)
+    given = tuple(name for name, value in zip(names, (dynamic, static, limit), strict=True) if value is not None)
     dynamic = element.dynamic_rating(geometry) if dynamic is None else dynamic
     static = element.static_rating(geometry) if static is None else static
     limit = element.fatigue_limit(static, geometry.pitch) if limit is None else limit

@@ -341,17 +341,11 @@ def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
     }
     found["time"] = (("time",), solution.t, {"units": "s", "long_name": "time"})
     for name, samples in solution.outputs.items():
-        if samples.ndim == 1:
-            found[name] = (("time",), samples, _attributes(infos[name]))
-            continue
-        balls = _ball_dimension(manifest, name)
-        found[name] = (("time", balls), samples, _attributes(infos[name]))
-        numbers = np.arange(1, samples.shape[1] + 1)
-        found[balls] = (
-            (balls,),
-            numbers,
-            {"units": "1", "long_name": bearing_words("number of the ball", manifest.bearings, name)},
-        )
+        balls = (_ball_dimension(manifest, name),) * (samples.ndim - 1)
+        found[name] = (("time", *balls), samples, _attributes(infos[name]))
+        for axis in balls:
+            words = bearing_words("number of the ball", manifest.bearings, name)
+            found[axis] = (balls, np.arange(1, samples.shape[1] + 1), {"units": "1", "long_name": words})
     facts: dict[str, Any] = {
         "title": manifest.title,
         "scene": manifest.scene,
