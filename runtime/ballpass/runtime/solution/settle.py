@@ -99,7 +99,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
 
     Parameters
     ----------
-    request : its length is left out
+    request : without a length
     most : steady turns
 
     Raises
@@ -109,8 +109,6 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     SimulationError
         The computation failed.
     """
-    if request.cycles is not None or request.duration is not None:
-        raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     repetition = Repetition.of(model.manifest, numbers.values)
     turn = repetition.turn
     slowest = math.ceil(max(repetition.slowest_load, repetition.slowest_beat(MOST_RUN // 2 * turn)) / turn)
