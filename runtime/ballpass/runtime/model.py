@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -148,7 +148,6 @@ class Model(PointModel, Questions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
-        self._run_settings: RunInfo | None = None
         if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
 
@@ -157,12 +156,10 @@ class Model(PointModel, Questions):
     def __reduce__(self) -> tuple[Callable[..., Model], tuple[object, ...]]:
         return _load_same, (str(self.folder), _content(self.manifest), self._compiler)
 
-    @property
+    @cached_property
     def run_settings(self) -> RunInfo:
         """How long to run: as the scene says, else turns of the steady machine at the scene's own numbers."""
-        if self._run_settings is None:
-            self._run_settings = self.manifest.run if self.manifest.run.stated else find_transient(self)
-        return self._run_settings
+        return self.manifest.run if self.manifest.run.stated else find_transient(self)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -587,18 +584,11 @@ class Model(PointModel, Questions):
         >>> many["peak_ball_force"].round(-1)  # [N]
         array([4230., 4390., 4550., 4690.])
         """
-
-        def run(
-            table: Table,
-            rtol: float | None = rtol,
-            kinks: str | None = kinks,
-            observables: str | Sequence[str] = observables,
-        ) -> EnsembleResult:
-            where = {"threads": threads} if client is None else {"client": client}
-            return (simulate_many if client is None else simulate_parts)(
+        where = partial(simulate_many, threads=threads) if client is None else partial(simulate_parts, client=client)
+        with shown("simulating members", progress) as tell:
+            run = partial(
+                where,
                 self,
-                table,
-                observables,
                 cycles=cycles,
                 duration=duration,
                 transient=transient,
@@ -607,11 +597,8 @@ class Model(PointModel, Questions):
                 kinks=kinks,
                 lanes=lanes,
                 progress=tell,
-                **where,
             )
-
-        with shown("simulating members", progress) as tell:
-            return simulate_members(self, parameters, observables, run) if uncertainty else run(parameters)
+            return simulate_members(self, parameters, observables, run) if uncertainty else run(parameters, observables)
 
     def growth(
         self,
