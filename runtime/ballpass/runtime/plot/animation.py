@@ -45,17 +45,13 @@ class Frames:
     turning: bool
 
     @property
-    def first(self) -> Record:
-        return self.records[0]
-
-    @property
     def peak(self) -> int:
         """Frame of the highest ball force; without it of the greatest drive torque; else the first."""
         drawn = [record for record in self.records if record.bearing is not None and record.has_ball_force]
         if drawn:
             return int(np.argmax(np.max([record.highest_ball_force()[self.samples] for record in drawn], axis=0)))
-        if self.first.has("drive_torque"):
-            return int(np.argmax(np.abs(self.first.values("drive_torque")[self.samples])))
+        if self.records[0].has("drive_torque"):
+            return int(np.argmax(np.abs(self.records[0].values("drive_torque")[self.samples])))
         return 0
 
 
@@ -105,7 +101,7 @@ def check_turns(turns: float) -> None:
 
 def to_plain(frames: Frames) -> dict[str, Any]:
     """All numbers of a page, as JSON has them; signals as whole multiples of a step."""
-    record, samples = frames.first, frames.samples
+    record, samples = frames.records[0], frames.samples
     manifest, angle = record.manifest, np.degrees(record.crank_angle()[samples])
     return {
         "title": manifest.title,

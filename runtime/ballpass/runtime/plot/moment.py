@@ -71,8 +71,7 @@ def _between_samples(record: Record) -> str:
 def _moment(record: Record) -> tuple[int, str]:
     """Sample to draw, and why."""
     if record.can_draw_bearing:
-        _, force = record.ball_force()
-        return int(np.argmax(np.max(force, axis=1))), f"highest sample of the {record.noun} force"
+        return int(np.argmax(record.highest_ball_force())), f"highest sample of the {record.noun} force"
     if record.has("drive_torque"):
         return int(np.argmax(np.abs(record.values("drive_torque")))), "highest sample of the drive torque"
     return 0, "start of the steady part"

@@ -205,11 +205,6 @@ class Record:
             return np.zeros((self.t.size, 2))
         return np.column_stack((self.values(f"{ring}.x"), self.values(f"{ring}.y")))
 
-    def bearing_share(self) -> float:
-        """Part of its joint's force that the bearing carries."""
-        values, path = self._values, "" if self.bearing is None else self.bearing.path
-        return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
-
     @property
     def radial_gap(self) -> float:
         """Approach of the rings at which a ball is in contact [m]: half the clearance, or what axial preload leaves."""
@@ -240,8 +235,8 @@ class Record:
         first = next(item[2] for item in self.mechanism.joints if item[0] == bearing.joint)
         # Eq. (2): the force on the outer ring's body presses the ring; the reaction is that of the second body on the
         # first
-        share = self.bearing_share() * (-1.0 if first == bearing.inner_body else 1.0)
-        return share * np.column_stack([self.values(name) for name in names])
+        share = self._values.get(f"{bearing.path}.share", 1.0) / self._values.get(f"{bearing.path}.count", 1.0)
+        return (-share if first == bearing.inner_body else share) * np.column_stack(list(map(self.values, names)))
 
     def _force_on_balls(self) -> Array:
         """Force of the inner ring on the balls, Eqs. (8) and (9), (n, 2) [N]."""

@@ -157,19 +157,6 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
     )
 
 
-def refuse_swinging(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: float) -> None:
-    """RequestError where `why_no_life` has a reason."""
-    reason = why_no_life(bearing, values, shaft_speed)
-    if reason:
-        others = "the life of a bearing that turns, or max:ball.force"
-        raise RequestError(f"{bearing.prefix}life: {reason} Allowed: {others}.")
-
-
-def geometry_is_assumed(bearing: BearingInfo, values: Mapping[str, Any]) -> bool:
-    """Whether the scene gives a stiffness, so that grooves and steel are the reference ones of ISO 76."""
-    return rated_element(bearing).is_assumed(geometry_of(bearing, values))
-
-
 def contacts_of(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[RacewayContact, RacewayContact]:
-    """Contacts with inner and outer ring; see `geometry_is_assumed`."""
+    """Contacts with inner and outer ring; of a scene that gives a stiffness those of ISO 76's grooves and steel."""
     return rated_element(bearing).contacts(geometry_of(bearing, values))
