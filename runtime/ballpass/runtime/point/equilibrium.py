@@ -192,11 +192,12 @@ class StaticEquilibrium(Reported):
             )
         directions = _with_driver(self.model, self.numbers, self.time, names)
         there = point(self.model, self.numbers, self.time, self.x)
-        moved = contract(self.model, _force_rows(self.model), directions, there)
+        half, held = len(self.coordinates), held_coordinates(self.model)
+        forces = Rows(function="static_forces", indices=np.arange(half), labels=self.coordinates, units=("N",) * half)
+        moved = contract(self.model, forces, directions, there)
         if self.load_is_given:
             (load,) = rows_of(self.model, _loads(self.model))
             moved[_loaded(self.model)] -= contract(self.model, load, directions, there)
-        half, held = len(self.coordinates), held_coordinates(self.model)
         moved[held] = 0.0
         slopes = np.linalg.solve(self.stiffness, moved)
         slopes[held] = directions.x[:half][held]
@@ -470,13 +471,6 @@ def _refuse_void(found: StaticEquilibrium) -> None:
         if words := void_words(bearing, found.numbers.values, deflection):
             raise SimulationError(f"static_equilibrium: {words}")
         first += bearing.balls
-
-
-def _force_rows(model: LoadedModel) -> Rows:
-    half = len(model.states) // 2
-    return Rows(
-        function="static_forces", indices=np.arange(half), labels=tuple(model.states[:half]), units=("N",) * half
-    )
 
 
 def _loads(model: LoadedModel) -> list[str]:
