@@ -36,7 +36,8 @@ from ballpass.runtime.report.digits import further, uncertainty
 from ballpass.runtime.request.choose_method import method_names
 from ballpass.runtime.request.locating import Kinks, refuse_with_error
 from ballpass.runtime.request.request import Request
-from ballpass.runtime.run.reduced_run import reduce_run
+from ballpass.runtime.request.resolve import resolve
+from ballpass.runtime.run.reduced_run import reduced
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.solution.sensitivity import Sensitivities, sensitivities
@@ -483,7 +484,7 @@ class Model(PointModel, Questions):
             parameters, initial, transient, cycles=cycles, duration=duration, method=method, rtol=rtol, kinks=kinks
         )
         with shown("simulating", progress) as tell:
-            return reduce_run(self, numbers, replace(request, progress=tell))
+            return reduced(resolve(self, numbers, replace(request, progress=tell)))
 
     def settle(
         self,

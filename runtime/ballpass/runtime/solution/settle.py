@@ -24,7 +24,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
-from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
+from ballpass.runtime.run.reduced_run import ReducedRun, reduced, start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
@@ -173,13 +173,6 @@ def doubled(span: Span, turns: float, most: float) -> Iterator[float]:
     while turns <= most:
         yield span.counting(turns).end
         turns *= 2
-
-
-def reduced(run: Run) -> Reductions:
-    """Reductions of the steady turns of a run."""
-    going = start_reducing(run, channel_names(run.model.manifest))
-    going.go_on()
-    return going.take()
 
 
 def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = None) -> Settled | None:
