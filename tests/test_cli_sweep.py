@@ -19,7 +19,6 @@ from ballpass.derive import read_scene
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.ranges import read_ranges
 from ballpass.runtime.ask.parameter_range import MOST, ParameterRange
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.style import GREY
 from ballpass.runtime.plot.sweep import LUMINANCE, draw_sweep
 
@@ -253,5 +252,3 @@ def test_a_map_without_change_or_with_gaps_is_drawn_and_one_without_values_refus
     (place,) = (line.get_xydata()[0] for line in crosses)
     assert place == pytest.approx((2.0, 3.0))
     draw_sweep("t", axes, "q", "quantity", "N", np.ones((3, 2)), "").canvas.draw()
-    with pytest.raises(RequestError, match="nothing to draw"):
-        draw_sweep("t", axes, "q", "quantity", "N", np.full((3, 2), np.nan), "")

@@ -12,9 +12,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from scripts.validation.kinematics import kinematic_frequencies
 from scripts.validation.lines import SpallLines, asked, commit, committed, read_mfpt
-
-from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
 TABLE = "mfpt_lines.csv"
 SOURCE = """Lines read off recordings of the Society for Machinery Failure Prevention Technology (MFPT), by

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scripts.validation.kinematics import kinematic_frequencies
 from scripts.validation.lines import (
     HERE,
     SpallLines,
@@ -31,7 +32,6 @@ from scripts.validation.lines import (
 
 from ballpass.derive import generate
 from ballpass.runtime import load
-from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
 TABLE, OTHERS, SCENE = "cwru_lines.csv", "cwru_other_lines.csv", HERE / "cwru_6205.toml"
 SOURCE = """Lines read off recordings of the Bearing Data Center, Case Western Reserve University (drive end, 12 kHz),

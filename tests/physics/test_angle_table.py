@@ -10,7 +10,8 @@ import pytest
 
 from ballpass.runtime import Model
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.point.jacobian import quantity_values
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import rows_of, values_of_rows
 from ballpass.runtime.time.breakpoints import breakpoints
 
 DEGREE = math.pi / 180.0
@@ -37,7 +38,8 @@ def interpolated(crank: np.ndarray) -> np.ndarray:
 
 def drive_torque(model: Model, t: np.ndarray, parameters: dict[str, float]) -> np.ndarray:
     numbers = model.numbers(parameters)
-    return np.array([quantity_values(model, numbers, "drive_torque", t=float(at), x=None)[0] for at in t])
+    rows = rows_of(model, "drive_torque")
+    return np.array([values_of_rows(model, rows, point(model, numbers, float(at), None))[0] for at in t])
 
 
 @pytest.mark.parametrize(("speed", "start"), [(4 * math.pi, 0.0), (4 * math.pi, 5.1), (-9.0, 0.7)])

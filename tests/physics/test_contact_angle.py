@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scripts.validation.kinematics import kinematic_frequencies
 
 from ballpass.derive import SceneError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.ratings import life, load_ratings
-from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 from ballpass.runtime.ratings.of_bearing import contacts_of, ratings_of
 
 OUTPUTS = ('"inner.ay", "ball.force", "load.*"]', '"ball.*", "ring_force.*", "contact.stiffness.*", "load.*"]')

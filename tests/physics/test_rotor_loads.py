@@ -13,7 +13,8 @@ import pytest
 from ballpass.derive import SceneError, read_scene
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
-from ballpass.runtime.point.jacobian import quantity_values
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import rows_of, values_of_rows
 
 ROTOR = (Path(__file__).resolve().parents[2] / "scenes" / "varying_compliance.toml").read_text(encoding="utf-8")
 OLD = ROTOR[ROTOR.index("[load]") : ROTOR.index("[bearing]")]
@@ -130,7 +131,7 @@ def test_loads_beside_a_mechanism_add_to_the_share_of_the_reaction(make_virtual:
     push += 'phase = "0 deg"\n[run]'
     both = (make_virtual("punching_press"), make_virtual("punching_press", ("[run]", push)))
     for t in np.linspace(0.0, 0.1, 7).tolist():
-        found = [[quantity_values(m, m.numbers(), f"load.{a}", t=t, x=None)[0] for a in "xy"] for m in both]
+        found = [values_of_rows(m, rows_of(m, ["load.x", "load.y"]), point(m, m.numbers(), t, None)) for m in both]
         added = np.subtract(found[1], found[0])
         assert added == pytest.approx([50.0 * math.cos(80 * math.pi * t), 10.0], abs=1e-11 * np.max(np.abs(found)))
 

@@ -12,7 +12,8 @@ import pytest
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import Model, Solution, UnusualWarning
-from ballpass.runtime.point.jacobian import quantity_values
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import rows_of, values_of_rows
 
 SPRING = """[mechanism.springs.return]
 bodies = ["frame", "lever"]
@@ -76,7 +77,8 @@ def lever(crank: np.ndarray, speed: float) -> Lever:
 def along_turn(model: Model, of: str, parameters: Mapping[str, float] | None = None) -> np.ndarray:
     numbers = model.numbers(parameters)
     speed = numbers.values["mechanism.driver.speed"]
-    return np.array([quantity_values(model, numbers, of, t=a / speed, x=None)[0] for a in TURN])
+    rows = rows_of(model, of)
+    return np.array([values_of_rows(model, rows, point(model, numbers, a / speed, None))[0] for a in TURN])
 
 
 @pytest.mark.long

@@ -19,7 +19,8 @@ from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.certify.jacobian_check import _quotient, checked_jacobian
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point import slopes
-from ballpass.runtime.point.jacobian import JacobianDirections, directions_of, output_tangents, quantity_values
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import JacobianDirections, directions_of, output_tangents, rows_of, values_of_rows
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -81,7 +82,7 @@ def test_slope_of_a_contact_is_that_of_hertz(press: Model) -> None:
     t = 0.0811
     x = loaded_state(press, t)
     k_b = press.constants()["bearing.k_b"]
-    delta = quantity_values(press, press.numbers(), "ball.deflection", t=t, x=x)
+    delta = values_of_rows(press, rows_of(press, "ball.deflection"), point(press, press.numbers(), t, x))
     slope = 1.5 * k_b * np.sqrt(np.maximum(delta, 0.0))
     by_clearance = press.jacobian("ball.elastic_force", "bearing.clearance", t=t, x=x)
     assert by_clearance == pytest.approx(-0.5 * slope, rel=1e-12)
@@ -98,7 +99,8 @@ def test_reactions_are_linear_in_the_punch_force(press: Model) -> None:
     force = "mechanism.forces.punch.force.y"
     numbers, idle = press.numbers(), press.numbers({force: 0.0})
     of = ["reaction.*.x", "reaction.*.y", "drive_torque"]
-    loaded, unloaded = (quantity_values(press, n, of, t=inside, x=None) for n in (numbers, idle))
+    rows = rows_of(press, of)
+    loaded, unloaded = (values_of_rows(press, rows, point(press, n, inside, None)) for n in (numbers, idle))
     slope = press.jacobian(of, force, t=inside)
     assert slope == pytest.approx((loaded - unloaded) / numbers.values[force], rel=1e-9, abs=1e-12)
     assert not np.any(press.jacobian(of, force, t=0.0))
@@ -109,7 +111,8 @@ def test_slope_by_crank_angle_integrates_to_the_drive_torque(press: Model) -> No
     first, last = math.radians(20.0), math.radians(200.0)  # the punch does not act there
 
     def torque(angle: float) -> float:
-        return float(quantity_values(press, press.numbers(), "drive_torque", t=angle / speed, x=None)[0])
+        there = point(press, press.numbers(), angle / speed, None)
+        return float(values_of_rows(press, rows_of(press, "drive_torque"), there)[0])
 
     total, _ = quad(
         lambda angle: float(press.jacobian("drive_torque", "crank_angle", t=angle / speed)), first, last, epsrel=1e-9

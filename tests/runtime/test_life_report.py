@@ -185,11 +185,11 @@ def test_wear_of_an_even_load_is_that_of_a_pass_times_the_passes(press: Model) -
     angle = (speed * time) % (2.0 * np.pi)
     force = np.full((len(time), balls), load)
     samples = LoadSamples(time=time, crank=angle, force=force, resultant=0.0 * time, in_outer=angle, in_inner=angle)
-    field = wear_field(samples, angle, ring)
+    across, rate = wear_field(samples, angle, ring)
     expected = balls * abs(speed) / (2.0 * np.pi) * depth_of_pass(0.0, load, ring)
-    np.testing.assert_allclose(field.rate[:, 0], expected, rtol=3e-3)
-    assert field.across[-1] == pytest.approx(ring.semi_axes(load)[0])
-    np.testing.assert_array_equal(field.rate[:, -1], 0.0)
+    np.testing.assert_allclose(rate[:, 0], expected, rtol=3e-3)
+    assert across[-1] == pytest.approx(ring.semi_axes(load)[0])
+    np.testing.assert_array_equal(rate[:, -1], 0.0)
 
 
 THREE_LOADS = """

@@ -15,7 +15,8 @@ from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import resolve
-from ballpass.runtime.solution.settle import LEAST, MEANS, PEAKS, changed, reduced
+from ballpass.runtime.run.reduced_run import reduced
+from ballpass.runtime.solution.settle import LEAST, MEANS, PEAKS, changed
 
 ANGLE = "bearing.ball_angle"
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "punching_press.toml"

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import signal as scipy_signal
+from scripts.validation.kinematics import kinematic_frequencies
 
 from ballpass.derive import SceneError, read_scene
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, mean_speeds, name_of
 from ballpass.runtime.questions.spectrum import spectrum
-from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 from ballpass.runtime.vibration.diagnosis import diagnosis, envelope, order_spectrum, spectrogram
 from ballpass.runtime.vibration.spectrum import amplitude_spectrum, power_spectrum
 

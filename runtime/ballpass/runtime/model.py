@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -36,7 +36,8 @@ from ballpass.runtime.report.digits import further, uncertainty
 from ballpass.runtime.request.choose_method import method_names
 from ballpass.runtime.request.locating import Kinks, refuse_with_error
 from ballpass.runtime.request.request import Request
-from ballpass.runtime.run.reduced_run import reduce_run
+from ballpass.runtime.request.resolve import resolve
+from ballpass.runtime.run.reduced_run import reduced
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.solution.sensitivity import Sensitivities, sensitivities
@@ -148,7 +149,6 @@ class Model(PointModel, Questions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
-        self._run_settings: RunInfo | None = None
         if manifest.run.at_rest:
             from ballpass.runtime.point.equilibrium import seated  # with SciPy
 
@@ -157,12 +157,10 @@ class Model(PointModel, Questions):
     def __reduce__(self) -> tuple[Callable[..., Model], tuple[object, ...]]:
         return _load_same, (str(self.folder), _content(self.manifest), self._compiler)
 
-    @property
+    @cached_property
     def run_settings(self) -> RunInfo:
         """How long to run: as the scene says, else turns of the steady machine at the scene's own numbers."""
-        if self._run_settings is None:
-            self._run_settings = self.manifest.run if self.manifest.run.stated else find_transient(self)
-        return self._run_settings
+        return self.manifest.run if self.manifest.run.stated else find_transient(self)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -486,7 +484,7 @@ class Model(PointModel, Questions):
             parameters, initial, transient, cycles=cycles, duration=duration, method=method, rtol=rtol, kinks=kinks
         )
         with shown("simulating", progress) as tell:
-            return reduce_run(self, numbers, replace(request, progress=tell))
+            return reduced(resolve(self, numbers, replace(request, progress=tell)))
 
     def settle(
         self,
@@ -587,18 +585,11 @@ class Model(PointModel, Questions):
         >>> many["peak_ball_force"].round(-1)  # [N]
         array([4230., 4390., 4550., 4690.])
         """
-
-        def run(
-            table: Table,
-            rtol: float | None = rtol,
-            kinks: str | None = kinks,
-            observables: str | Sequence[str] = observables,
-        ) -> EnsembleResult:
-            where = {"threads": threads} if client is None else {"client": client}
-            return (simulate_many if client is None else simulate_parts)(
+        where = partial(simulate_many, threads=threads) if client is None else partial(simulate_parts, client=client)
+        with shown("simulating members", progress) as tell:
+            run = partial(
+                where,
                 self,
-                table,
-                observables,
                 cycles=cycles,
                 duration=duration,
                 transient=transient,
@@ -607,11 +598,8 @@ class Model(PointModel, Questions):
                 kinks=kinks,
                 lanes=lanes,
                 progress=tell,
-                **where,
             )
-
-        with shown("simulating members", progress) as tell:
-            return simulate_members(self, parameters, observables, run) if uncertainty else run(parameters)
+            return simulate_members(self, parameters, observables, run) if uncertainty else run(parameters, observables)
 
     def growth(
         self,

@@ -19,7 +19,8 @@ from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, resolve
-from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond, reduced
+from ballpass.runtime.run.reduced_run import reduced
+from ballpass.runtime.solution.settle import MEANS, PEAKS, changed, look_beyond
 from ballpass.runtime.time.breakpoints import rows_over_time
 from ballpass.runtime.time.repetition import Repetition
 

@@ -30,9 +30,9 @@ from ballpass.runtime.ratings.of_bearing import (
     RacewayContact,
     Ratings,
     contacts_of,
-    geometry_is_assumed,
     geometry_of,
     radial_gap,
+    rated_element,
     ratings_of,
     why_no_life,
 )
@@ -130,7 +130,7 @@ def _bearing(
         static_rating=float(ratings.static),
         fatigue_limit=float(ratings.fatigue_limit),
         given=ratings.given,
-        assumed=geometry_is_assumed(info, values),
+        assumed=rated_element(info).is_assumed(geometry_of(info, values)),
         peak_force=force,
         peak_time=peak.maximum_time,
         peak_ball=int(peak.maximum_ball or 0),
@@ -204,12 +204,10 @@ def _tilt(info: BearingInfo, values: Mapping[str, float], load: float, shaft: fl
         free = free_tilt(
             float(geometry.diameter), float(geometry.pitch), (inner, outer), 2.0 * radial_gap(info, values)
         )
-    if said is None:
-        return Tilt(misalignment=None, bending=None, free=free, shaft=shaft)
     bending = None
-    if said.span is not None and said.shaft_diameter is not None:
+    if said is not None and said.span is not None and said.shaft_diameter is not None:
         bending = shaft_slope(load, said.span, said.shaft_diameter)
-    return Tilt(misalignment=said.misalignment, bending=bending, free=free, shaft=shaft)
+    return Tilt(misalignment=None if said is None else said.misalignment, bending=bending, free=free, shaft=shaft)
 
 
 def static_safety(balls: int, static_rating: float, force: float) -> float:
@@ -243,18 +241,19 @@ def _rings(
     total = float(sum(np.sum(part) for part in damage))
 
     def ring(k: int, contact: RacewayContact, place: NDArray[np.float64]) -> RingStrength:
-        across, along = contact.semi_axes(force)
-        worn, angle, off = wear_field(samples, place, contact).deepest
+        wide, narrow = contact.semi_axes(force)
+        across, rate = wear_field(samples, place, contact)
+        sector, off = np.unravel_index(int(np.argmax(rate)), rate.shape)
         return RingStrength(
             peak_pressure=float(contact.peak_pressure(force)),
-            major_axis=float(across),
-            minor_axis=float(along),
+            major_axis=float(wide),
+            minor_axis=float(narrow),
             equivalent_load=float(loads[k]) if turns else None,
             damage=tuple((damage[k] / total).tolist()) if turns and total > 0.0 else (),
             worst_angle=TURN * int(np.argmax(fields[k])) / SECTORS,
-            wear=(COEFFICIENTS[0] * worn, COEFFICIENTS[1] * worn),
-            wear_angle=angle,
-            wear_across=off,
+            wear=(COEFFICIENTS[0] * float(rate[sector, off]), COEFFICIENTS[1] * float(rate[sector, off])),
+            wear_angle=TURN * (int(sector) + 0.5) / SECTORS,
+            wear_across=float(across[off]),
         )
 
     inner, outer = contacts_of(info, values)

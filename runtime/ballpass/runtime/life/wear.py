@@ -63,16 +63,12 @@ class LoadSamples:
     deep_groove: bool = True
     tilt: float | None = None
 
-    @property
-    def axial(self) -> Array:
-        """Axial force on the inner ring, shape (samples,) [N]."""
-        return np.asarray(np.sin(self.contact_angle) * np.sum(self.force, axis=1))
-
     def equivalent_load(self, power: float) -> float:
         """P of ISO 281, mean of a power over the angle that the rings turn against each other, else over time [N]."""
         turned = np.abs(passed_angle(self.in_outer) - passed_angle(self.in_inner))
         weight = turned if np.any(turned) else np.ones_like(turned)
-        load = combined_load(self.resultant, self.axial, self.contact_angle, deep_groove=self.deep_groove)
+        axial = np.sin(self.contact_angle) * np.sum(self.force, axis=1)
+        load = combined_load(self.resultant, axial, self.contact_angle, deep_groove=self.deep_groove)
         return float(np.average(load**power, weights=weight) ** (1.0 / power))
 
 
@@ -107,13 +103,14 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
     inputs = timeline.inputs_over(manifest, numbers.values, time, time)
     given = {"t": np.zeros(len(time)), "x": states, "u": inputs, "p": numbers.p, "c": numbers.c}
     signals = channels.outputs_at(len(time), given)
-    crank = np.array([timeline.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)])
+    angle = "" if manifest.mechanism is None else manifest.mechanism.angle
+    crank = states[:, model.states.index(angle)] if angle else timeline.driver(manifest, numbers.values).at(time)[0]
     found = {}
     for bearing in manifest.bearings:
         force, x, y, outer, inner = (signals[bearing.prefix + name] for name in names)
         found[bearing.prefix] = LoadSamples(
             time=time,
-            crank=crank,
+            crank=crank % TURN,
             force=np.maximum(force, 0.0),
             resultant=np.hypot(x[:, 0], y[:, 0]),
             contact_angle=float(np.arccos(min(contact_cosine(bearing, numbers.values), 1.0))),
@@ -134,32 +131,17 @@ def _tilt(bearing: BearingInfo, values: Mapping[str, float], states: Mapping[str
     return float(np.max(np.hypot(*(ends[1] - ends[0]))) / abs(second - first))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WearField:
-    """Wear of a raceway, over the wear coefficient.
-
-    Attributes
-    ----------
-    across : places across the groove, from its middle on, shape (ACROSS,) [m]
-    rate : depth a second over the coefficient, shape (SECTORS, ACROSS) [N/(m s)]
-    """
-
-    across: Array
-    rate: Array
-
-    @property
-    def deepest(self) -> tuple[float, float, float]:
-        """Largest rate [N/(m s)], its angle in the ring's own coordinates [rad], its place across the groove [m]."""
-        sector, k = np.unravel_index(int(np.argmax(self.rate)), self.rate.shape)
-        return float(self.rate[sector, k]), TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
-
-
-def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> WearField:
-    """Wear that the passing balls leave on a raceway.
+def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> tuple[Array, Array]:
+    """Wear that the passing balls leave on a raceway, over the wear coefficient.
 
     Parameters
     ----------
     angle : of ball 1 as the ring sees it: `LoadSamples.in_outer` or `in_inner`
+
+    Returns
+    -------
+    across : places across the groove, from its middle on, shape (ACROSS,) [m]
+    rate : depth a second over the coefficient, shape (SECTORS, ACROSS) [N/(m s)]
     """
     force = samples.force
     count, balls = force.shape
@@ -177,7 +159,7 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
         within = half > x
         worn = passed[within] * depth_of_pass(x, load[within], contact)
         rate[:, k] = np.bincount(sector[within], worn, SECTORS)
-    return WearField(across=across, rate=rate * SECTORS / (TURN * length))
+    return across, rate * SECTORS / (TURN * length)
 
 
 def passed_angle(angle: Array) -> Array:

@@ -45,17 +45,13 @@ class Frames:
     turning: bool
 
     @property
-    def first(self) -> Record:
-        return self.records[0]
-
-    @property
     def peak(self) -> int:
         """Frame of the highest ball force; without it of the greatest drive torque; else the first."""
         drawn = [record for record in self.records if record.bearing is not None and record.has_ball_force]
         if drawn:
             return int(np.argmax(np.max([record.highest_ball_force()[self.samples] for record in drawn], axis=0)))
-        if self.first.has("drive_torque"):
-            return int(np.argmax(np.abs(self.first.values("drive_torque")[self.samples])))
+        if self.records[0].has("drive_torque"):
+            return int(np.argmax(np.abs(self.records[0].values("drive_torque")[self.samples])))
         return 0
 
 
@@ -105,7 +101,7 @@ def check_turns(turns: float) -> None:
 
 def to_plain(frames: Frames) -> dict[str, Any]:
     """All numbers of a page, as JSON has them; signals as whole multiples of a step."""
-    record, samples = frames.first, frames.samples
+    record, samples = frames.records[0], frames.samples
     manifest, angle = record.manifest, np.degrees(record.crank_angle()[samples])
     return {
         "title": manifest.title,
@@ -150,24 +146,21 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
     corners = shapes.drawn_corners(mechanism, paths)
     low, high = corners.min(axis=0), corners.max(axis=0)
     shown = shown_points(mechanism)
-    guides = []
-    for _, kind, first, guide, second, block in mechanism.joints:
-        if kind == "prismatic":
-            fixed = first == FRAME
-            direction = shapes.guide_direction(poses[0], paths, (first, guide), (second, block)) if fixed else None
-            guides.append(
-                {
-                    "guide": shown.index((first, guide)),
-                    "block": shown.index((second, block)),
-                    "direction": None if direction is None else direction.tolist(),
-                }
-            )
+    joints = [(name, kind, (b, p), (c, q)) for name, kind, b, p, c, q in mechanism.joints]
+    guides = [
+        {
+            "guide": shown.index(one),
+            "block": shown.index(other),
+            "direction": shapes.guide_direction(poses[0], paths, one, other).tolist() if one[0] == FRAME else None,
+        }
+        for _, kind, one, other in joints
+        if kind == "prismatic"
+    ]
     size = float(np.max(high - low))
     names: dict[int, list[str]] = {}  # joints that stay together share a place
-    for name, _, _, _, body, point in mechanism.joints:
-        path = paths[body, point]
-        near = (k for k in names if float(np.max(np.abs(paths[shown[k]] - path))) < 0.01 * size)
-        names.setdefault(next(near, shown.index((body, point))), []).append(name)
+    for name, _, _, at in joints:
+        near = (k for k in names if float(np.max(np.abs(paths[shown[k]] - paths[at]))) < 0.01 * size)
+        names.setdefault(next(near, shown.index(at)), []).append(name)
     return {
         "low": low.tolist(),
         "high": high.tolist(),
@@ -177,18 +170,14 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             for body, keys in shapes.links(used, poses[0], size)
         ],
         "pins": [
-            {"at": shown.index((second, point)), "fixed": FRAME in (first, second)}
-            for _, kind, first, _, second, point in mechanism.joints
+            {"at": shown.index(at), "fixed": FRAME in (one[0], at[0])}
+            for _, kind, one, at in joints
             if kind == "revolute"
         ],
         "guides": guides,
         "wheels": [[shown.index((b, p)), shown.index((c, q)), share] for b, p, c, q, share in mechanism.wheels],
         "springs": [[shown.index((b, p)), shown.index((c, q))] for _, b, p, c, q in mechanism.springs],
-        "driver": next(
-            shown.index((body, point)) for name, *_, body, point in mechanism.joints if name == mechanism.driver
-        )
-        if mechanism.driver
-        else None,
+        "driver": next((shown.index(at) for name, *_, at in joints if name == mechanism.driver), None),
         "masses": [shown.index(key) for key in shown if key[1] == "center_of_mass"],
         "tracers": [shown.index(key) for key in shapes.coupler_points(mechanism)],
         "names": [
@@ -224,7 +213,6 @@ def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
     gap, ball = record.radial_gap, record.parameter("bearing.ball_diameter")
     inner, outer = record.centres("inner")[samples], record.centres("outer")[samples]
     moved = inner - outer
-    first = np.array([record.ball_angles(int(k))[0] for k in samples])
     words, force = record.ball_force()
     load = record.ring_load()
     furthest = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
@@ -237,7 +225,7 @@ def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
         "ball": ball,
         "gap": gap,
         "factor": shapes.exaggeration(0.25 * ball, max(abs(gap), furthest)),
-        "ball_angle": _signal(_from_first_turn(np.degrees(first)), ANGLE),
+        "ball_angle": _signal(_from_first_turn(np.degrees(record.ball_angles(samples)[:, 0])), ANGLE),
         "force": _columns(force[samples]),
         "inner": _columns(1e6 * moved),
         "outer": _columns(1e6 * outer) if np.any(outer) else None,

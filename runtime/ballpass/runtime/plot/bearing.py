@@ -54,7 +54,7 @@ def draw_bearing(axes: Axes, record: Record, sample: int, samples: Sequence[int]
 
     highest = max(float(np.max(forces[shown])), 1e-12)
     scale = Normalize(0.0, highest)
-    angles = record.ball_angles(sample)
+    (angles,) = record.ball_angles(np.array([sample]))
     for number, (angle, load) in enumerate(zip(angles, force, strict=True), start=1):
         direction = np.array([np.cos(angle), np.sin(angle)])
         # a ball touches both raceways where it is loaded: half-way between them

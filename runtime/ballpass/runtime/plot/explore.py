@@ -41,10 +41,9 @@ def explore_page(model: PointModel, solution: Solution, *, units: Mapping[str, s
     records = records_of(model, solution, None)
     angle = records[0].crank_angle()
     turned = abs(float(angle[-1] - angle[0])) / TURN
-    cycle = records[0].cycle_turns
-    frames = choose_frames(records, turns=min(float(cycle), turned) or 1.0)
-    numbers = to_plain(frames)
-    numbers["solver"] = solver_columns(frames.first, numbers) | {
+    turns = min(float(records[0].cycle_turns), turned) or 1.0
+    numbers = to_plain(choose_frames(records, turns=turns))
+    numbers["solver"] = solver_columns(records[0], numbers) | {
         "module": base64.b64encode(gzip.compress(web_assembly(model), mtime=0)).decode(),
         "parameters": sliders(model.manifest, solution.parameters, units or {}),
         "scene": model.manifest.scene,

@@ -295,21 +295,17 @@ def _draw_spring(axes: Axes, one: Array, other: Array, size: float) -> None:
 
 def _put_names(words: _Words, record: Record, now: shapes.Points, size: float) -> None:
     """Names of the joints, those at one place together, and of coupler points."""
-    places: list[tuple[Array, list[str]]] = []
-    for name, _, _, _, body, point in record.mechanism.joints:
-        at = now[body, point]
-        shared = next((names for place, names in places if np.hypot(*(place - at)) < 0.01 * size), None)
-        if shared is None:
-            places.append((at, [name]))
-        else:
-            shared.append(name)
-    places += [(now[key], [key[1]]) for key in shapes.coupler_points(record.mechanism)]
-    for at, _ in places:
-        words.avoid(at, at, 0.1)
+    names: dict[tuple[str, str], list[str]] = {}
+    for name, *_, body, point in record.mechanism.joints:
+        near = (key for key in names if np.hypot(*(now[key] - now[body, point])) < 0.01 * size)
+        names.setdefault(next(near, (body, point)), []).append(name)
+    names |= {key: [key[1]] for key in shapes.coupler_points(record.mechanism)}
+    for key in names:
+        words.avoid(now[key], now[key], 0.1)
     blocks = [now[item[4], item[5]] for item in record.mechanism.joints if item[1] == "prismatic"]
-    for at, names in places:
-        block = any(np.hypot(*(place - at)) < 0.01 * size for place in blocks)
-        words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, places=1, fontsize=10)
+    for key, some in names.items():
+        block = any(np.hypot(*(place - now[key])) < 0.01 * size for place in blocks)
+        words.put(now[key], ", ".join(some), (0.08 if block else 0.025) * size, places=1, fontsize=10)
 
 
 def _forces(record: Record, now: shapes.Points, sample: int) -> list[_ForceArrow]:

@@ -11,7 +11,6 @@ from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import Record
 from ballpass.runtime.plot.style import frame, new_figure, styled
-from ballpass.runtime.time.turning import past
 
 
 @styled
@@ -26,7 +25,7 @@ def peak_moment(record: Record) -> Figure:
     both, on_paper = with_mechanism and with_bearing, PAPER.get()[0] is not None
     figure = new_figure(10.0 if both and on_paper else 5.6, layout=None)
     figure.set_layout_engine("none")  # axes of equal scales would become small
-    text = ""
+    text = f"{record.when(sample)}. "
     if both:
         # in a column of a paper one above the other
         left, right = figure.subplots(2, 1) if on_paper else figure.subplots(1, 2, width_ratios=(0.8, 1.0))
@@ -52,12 +51,9 @@ def peak_moment(record: Record) -> Figure:
             moved = 1e6 * np.hypot(*record.centres("outer")[sample])
             text += f", the outer ring itself has moved by {moved:.3g} µm"
         text += ". "
-    when = f"At t = {record.t[sample] * 1e3:.4g} ms"
-    if with_mechanism:
-        when += f", {record.manifest.angle_words} {np.degrees(past(record.crank_angle()[sample])):.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
     title = record.title(f"{subject} at the {reason}") + (_between_samples(record) if with_bearing else "")
-    frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.8 if on_paper else 0.3, below=0.1)
+    frame(figure, title, f"{text}{record.settings()}.", left=0.2, right=0.8 if on_paper else 0.3, below=0.1)
     return figure
 
 
@@ -75,8 +71,7 @@ def _between_samples(record: Record) -> str:
 def _moment(record: Record) -> tuple[int, str]:
     """Sample to draw, and why."""
     if record.can_draw_bearing:
-        _, force = record.ball_force()
-        return int(np.argmax(np.max(force, axis=1))), f"highest sample of the {record.noun} force"
+        return int(np.argmax(record.highest_ball_force())), f"highest sample of the {record.noun} force"
     if record.has("drive_torque"):
         return int(np.argmax(np.abs(record.values("drive_torque")))), "highest sample of the drive torque"
     return 0, "start of the steady part"

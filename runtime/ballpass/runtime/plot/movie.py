@@ -42,7 +42,7 @@ def write_movie(frames: Frames, path: Path, *, progress: Callable[[float], None]
         An MP4 needs the program ffmpeg, which is not on PATH or fails.
     """
     writer = writer_of(path.suffix)
-    record = frames.first
+    record = frames.records[0]
     shown = frames.samples.tolist()
     seen = view(record, shown) if record.manifest.mechanism is not None else None
     with settings(), replaced(path) as made:

@@ -16,10 +16,9 @@ from ballpass.runtime.ask.observables import turns
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import force_components, table_direction
 from ballpass.runtime.contract.parameters import check_name
-from ballpass.runtime.quantity.characteristic import frequencies_of, mean_speeds
-from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
+from ballpass.runtime.quantity.characteristic import KinematicFrequencies, frequencies_of, mean_speeds
 from ballpass.runtime.ratings.of_bearing import contact_cosine, inner_ring_mass, radial_gap, rated_element
-from ballpass.runtime.request.ball_angles import ball_angles, ball_angles_along
+from ballpass.runtime.request.ball_angles import ball_angles_along
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.repetition import Repetition
 from ballpass.runtime.time.turning import TURN, past
@@ -167,16 +166,16 @@ class Record:
             return None
         return frequencies_of(bearing, mean_speeds(self.solution))
 
-    def ball_angles(self, sample: int) -> Array:
-        """Angles of the balls at a sample, (balls,) [rad]."""
+    def ball_angles(self, samples: NDArray[np.int_] | slice = slice(None)) -> Array:
+        """Angles of the balls at all samples, or some, (n, balls) [rad]."""
         assert self.bearing is not None  # figures of balls are drawn of scenes with a bearing only
         numbers = self.model.numbers(self.solution.parameters)
-        angles = ball_angles(self.model, numbers, float(self.t[sample]), self.state(sample))
+        angles = ball_angles_along(self.model, numbers, self.t[samples], self.solution.x[samples])
         return angles[self.manifest.bearings.index(self.bearing)]
 
     def state(self, sample: int) -> Array:
         """State at a sample, (states,)."""
-        return np.array([self.solution[name][sample] for name in self.solution.states])
+        return np.asarray(self.solution.x[sample])
 
     def ball_force(self) -> tuple[str, Array]:
         """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
@@ -206,11 +205,6 @@ class Record:
             return np.zeros((self.t.size, 2))
         return np.column_stack((self.values(f"{ring}.x"), self.values(f"{ring}.y")))
 
-    def bearing_share(self) -> float:
-        """Part of its joint's force that the bearing carries."""
-        values, path = self._values, "" if self.bearing is None else self.bearing.path
-        return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
-
     @property
     def radial_gap(self) -> float:
         """Approach of the rings at which a ball is in contact [m]: half the clearance, or what axial preload leaves."""
@@ -230,12 +224,10 @@ class Record:
         if self.has("load.x", "load.y"):
             return np.column_stack((self.values("load.x"), self.values("load.y")))
         bearing = self.bearing
-        if bearing is not None and bearing.axis:
-            return self._force_on_balls() if self.has("ball.force") else None
-        if bearing is None or not self.loaded_by_joint:
+        if bearing is None or not (bearing.axis or self.loaded_by_joint):
             return None
         # two-way the reaction is that of the housing, which moves an outer ring of its own as well
-        if bearing.outer_ring and inner_ring_mass(bearing, self._values) is None:
+        if bearing.axis or (bearing.outer_ring and inner_ring_mass(bearing, self._values) is None):
             return self._force_on_balls() if self.has("ball.force") else None
         names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
         if not self.has(*names):
@@ -243,17 +235,14 @@ class Record:
         first = next(item[2] for item in self.mechanism.joints if item[0] == bearing.joint)
         # Eq. (2): the force on the outer ring's body presses the ring; the reaction is that of the second body on the
         # first
-        share = self.bearing_share() * (-1.0 if first == bearing.inner_body else 1.0)
-        return share * np.column_stack([self.values(name) for name in names])
+        share = self._values.get(f"{bearing.path}.share", 1.0) / self._values.get(f"{bearing.path}.count", 1.0)
+        return (-share if first == bearing.inner_body else share) * np.column_stack(list(map(self.values, names)))
 
     def _force_on_balls(self) -> Array:
         """Force of the inner ring on the balls, Eqs. (8) and (9), (n, 2) [N]."""
         bearing = self.bearing
         assert bearing is not None  # of those only
-        numbers = self.model.numbers(self.solution.parameters)
-        states = np.column_stack([self.solution[name] for name in self.solution.states])
-        angles = ball_angles_along(self.model, numbers, self.t, states)[self.manifest.bearings.index(bearing)]
-        radial = contact_cosine(bearing, self._values) * self.values("ball.force")
+        angles, radial = self.ball_angles(), contact_cosine(bearing, self._values) * self.values("ball.force")
         return np.column_stack([np.sum(radial * part(angles), axis=1) for part in (np.cos, np.sin)])
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
@@ -311,6 +300,13 @@ class Record:
         flat = self.model.function("geometry")(*(given[name] for name, _ in signature))
         pairs = np.array(flat, dtype=float).reshape(-1, 2)
         return {(info.body, info.point): pairs[k] for k, info in enumerate(self.mechanism.points)}
+
+    def when(self, sample: int) -> str:
+        """Words for the moment of a sample: its time and, of a mechanism, the angle then."""
+        words = f"At t = {self.t[sample] * 1e3:.4g} ms"
+        if self.manifest.mechanism is None:
+            return words
+        return f"{words}, {self.manifest.angle_words} {np.degrees(past(self.crank_angle()[sample])):.1f}°"
 
     def title(self, words: str) -> str:
         """Title of a figure: these words and, on a line of its own, the bearing's name if it has one."""

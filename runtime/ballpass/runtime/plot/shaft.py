@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.style import APPLIED, GREY, SIGNAL, frame, new_figure, styled
-from ballpass.runtime.time.turning import past
 
 
 def has_shaft(record: Record) -> bool:
@@ -68,10 +67,7 @@ def shaft_loads(record: Record) -> Figure:
     for axes in grid:
         axes.plot([min(places), max(places)], [0.0, 0.0], color=GREY, linewidth=3, solid_capstyle="round", zorder=1)
     grid[1].set_xlabel("place along the shaft [mm]")
-    when = f"At t = {record.t[sample] * 1e3:.4g} ms"
-    if record.manifest.mechanism is not None:
-        when += f", {record.manifest.angle_words} {np.degrees(past(record.crank_angle()[sample])):.1f}°"
-    text = f"{when}: forces on the shaft, of its bearings (red)"
+    text = f"{record.when(sample)}: forces on the shaft, of its bearings (red)"
     text += ", and of joints and loads that have a place along it (brown)" * bool(applied)
     whole = replace(record, bearing=None)  # the figure is of all bearings
     title = whole.title("The shaft at the highest force of a bearing")

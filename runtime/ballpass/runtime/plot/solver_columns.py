@@ -33,7 +33,7 @@ def solver_columns(record: Record, numbers: Mapping[str, Any]) -> dict[str, Any]
     column = {name: k for k, name in enumerate(names)}
     run, mechanism = manifest.run, manifest.mechanism
     speed = speed_name(manifest)
-    drawn = [info for info in (bearing_of(manifest, one["name"]) for one in numbers["bearings"]) if info is not None]
+    drawn = [info for one in numbers["bearings"] for info in manifest.bearings if info.name == one["name"]]
     return {
         "columns": names,
         "units": [unit for _, unit in columns_of(manifest)],
@@ -70,11 +70,6 @@ def _usual(manifest: Manifest, info: UsualInfo, place: Mapping[str, int]) -> dic
         "most": info.most,
         "words": "".join(usual_template(manifest, info)),
     }
-
-
-def bearing_of(manifest: Manifest, name: str) -> BearingInfo | None:
-    """The bearing of a name, which is empty of the only one."""
-    return next((info for info in manifest.bearings if info.name == name), None)
 
 
 def _linkage(

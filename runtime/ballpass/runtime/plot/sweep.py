@@ -17,7 +17,6 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
 from ballpass.runtime.ask.parameter_range import ParameterRange
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, label, log_ticks, new_figure, styled
 
 #: From dark to light, with equal steps of luminance: places are those of the palette's own luminances.
@@ -41,19 +40,10 @@ def draw_sweep(
     title : of the scene
     quantity, words : its name and description
     axes : one or two varied parameters
-    values : of the quantity, shape (points,) or (points of the first, points of the second), NaN where there is none
-        [`unit`]
+    values : of the quantity, some of them finite, shape (points,) or (points of the first, points of the second), NaN
+        where there is none [`unit`]
     text : further text of the caption
-
-    Raises
-    ------
-    RequestError
-        There are more than two varied parameters, or no value at all.
     """
-    if len(axes) not in (1, 2):
-        raise RequestError(f"A figure shows one or two varied parameters, not {len(axes)}. Vary fewer.")
-    if not np.any(np.isfinite(values)):
-        raise RequestError(f"{quantity}: no member has a value: there is nothing to draw.")
     figure = new_figure(4.4 if len(axes) == 1 else 5.0)
     panel = figure.add_subplot()
     if len(axes) == 1:

@@ -16,7 +16,6 @@ from matplotlib.patches import Patch
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.grazing import merge_grazing
 from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
-from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, unit_words
 
 #: Bars of a chart.
@@ -35,20 +34,9 @@ _LOOKS: dict[Verdict, tuple[str, str, str]] = {
 
 @styled
 def tornado(report: SensitivityReport, quantity: str) -> Figure:
-    """Chart of one quantity.
-
-    Raises
-    ------
-    RequestError
-        The report does not have it, or no parameter moves it.
-    """
-    names = [item.name for item in report.quantities]
-    if quantity not in names:
-        raise RequestError(f"tornado: {quantity!r} is not in this report. It has: {', '.join(names)}.")
-    found = report.quantities[names.index(quantity)]
+    """Chart of one quantity of the report, that some parameter moves."""
+    found = next(item for item in report.quantities if item.name == quantity)
     pairs = _bars(report, quantity)
-    if not pairs:
-        raise RequestError(f"tornado: no parameter of this report moves {quantity}: there is nothing to draw.")
     labels = [report.words[pair.parameter] for pair in pairs]
     bars_of = [
         words if labels.count(words) == 1 else f"{words} ({pair.parameter})"

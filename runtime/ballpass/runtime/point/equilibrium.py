@@ -183,6 +183,8 @@ class StaticEquilibrium(Reported):
         for name in names:
             if name in (*self.model.states, "states"):
                 raise RequestError(f"static equilibrium: {name!r} is found, not given. Differentiate by parameters.")
+        if of == RHS:
+            raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
         if len(self.free_directions):
             raise RequestError(
                 "static equilibrium: a ring is free to move along some direction, so that its place is not a function "
@@ -190,29 +192,19 @@ class StaticEquilibrium(Reported):
             )
         directions = _with_driver(self.model, self.numbers, self.time, names)
         there = point(self.model, self.numbers, self.time, self.x)
-        moved = contract(self.model, _force_rows(self.model), directions, there)
+        half, held = len(self.coordinates), held_coordinates(self.model)
+        forces = Rows(function="static_forces", indices=np.arange(half), labels=self.coordinates, units=("N",) * half)
+        moved = contract(self.model, forces, directions, there)
         if self.load_is_given:
             (load,) = rows_of(self.model, _loads(self.model))
             moved[_loaded(self.model)] -= contract(self.model, load, directions, there)
-        half, held = len(self.coordinates), held_coordinates(self.model)
         moved[held] = 0.0
         slopes = np.linalg.solve(self.stiffness, moved)
-        if of == "positions":
-            slopes[held] = directions.x[:half][held]
-            total = slopes
-        else:
-            if of == RHS:
-                raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
-            parts = []
-            for rows in rows_of(self.model, of):
-                part = contract(self.model, rows, directions, there)
-                name = f"{rows.function}_jac_x"
-                if self.model.has(name):
-                    by_states = self.model.kernel(name)(there).reshape(-1, len(self.x))
-                    part += by_states[rows.indices, :half] @ slopes
-                parts.append(part)
-            total = np.concatenate(parts)
-        return np.asarray(total[:, 0] if isinstance(wrt, str) else total)
+        slopes[held] = directions.x[:half][held]
+        if of != "positions":  # the rings move along
+            moving = replace(directions, x=np.vstack([slopes, directions.x[half:]]))
+            slopes = np.concatenate([contract(self.model, rows, moving, there) for rows in rows_of(self.model, of)])
+        return np.asarray(slopes[:, 0] if isinstance(wrt, str) else slopes)
 
 
 def _with_driver(model: LoadedModel, numbers: Numbers, t: float, names: Sequence[str]) -> JacobianDirections:
@@ -479,13 +471,6 @@ def _refuse_void(found: StaticEquilibrium) -> None:
         if words := void_words(bearing, found.numbers.values, deflection):
             raise SimulationError(f"static_equilibrium: {words}")
         first += bearing.balls
-
-
-def _force_rows(model: LoadedModel) -> Rows:
-    half = len(model.states) // 2
-    return Rows(
-        function="static_forces", indices=np.arange(half), labels=tuple(model.states[:half]), units=("N",) * half
-    )
 
 
 def _loads(model: LoadedModel) -> list[str]:

@@ -25,7 +25,6 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import Manifest
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.request.request import on_request
 from ballpass.runtime.time import timeline
 
@@ -242,13 +241,6 @@ def contract(model: LoadedModel, rows: Rows, directions: JacobianDirections, the
     return total
 
 
-def quantity_values(
-    model: LoadedModel, numbers: Numbers, of: str | Sequence[str], *, t: float, x: Sequence[float] | np.ndarray | None
-) -> Array:
-    """Values of the quantities that `jacobian` differentiates, all rows one below the other, shape (rows,)."""
-    return values_of_rows(model, rows_of(model, of), point(model, numbers, checked_time(t), x))
-
-
 def values_of_rows(model: LoadedModel, parts: Sequence[Rows], there: Mapping[str, object]) -> Array:
     """Values of rows with the arguments `there`, shape (rows,)."""
     return np.concatenate([model.kernel(part.function)(there)[part.indices] for part in parts])
@@ -302,11 +294,14 @@ def output_tangents(
     >>> force.shape  # [N]: samples, balls, directions
     (3, 8, 2)
     """
-    count, given = len(t), [d for d in (dx, du, dp, dc, dt) if d is not None]
-    if not given:
+    count = len(t)
+    given = {"t": t, "x": x, "u": u, "p": numbers.p, "c": numbers.c}
+    moved = {"x": dx, "u": du, "p": dp, "c": dc, "t": dt}
+    states, inputs = len(model.states), len(model.manifest.inputs)
+    shapes = {"t": (count,), "x": (count, states), "u": (count, inputs), "p": numbers.p.shape, "c": numbers.c.shape}
+    moves = next((one.shape[-1] for one in moved.values() if one is not None), None)
+    if moves is None:
         raise RequestError("output_tangents: no direction was given. Give one or more of dx, du, dp, dc, dt.")
-    moves = given[0].shape[-1]
-    sizes = {"dx": len(model.states), "du": len(model.manifest.inputs), "dp": len(numbers.p), "dc": len(numbers.c)}
 
     def shaped(value: Array | None, shape: tuple[int, ...], name: str) -> Array:
         if value is None:
@@ -316,29 +311,15 @@ def output_tangents(
         except ValueError as fault:
             raise RequestError(f"output_tangents: {name} of shape {shape} is expected, not {value.shape}.") from fault
 
-    along_x = shaped(dx, (count, sizes["dx"], moves), "dx")
-    along_u = shaped(du, (count, sizes["du"], moves), "du")
-    along_p, along_c = shaped(dp, (sizes["dp"], moves), "dp"), shaped(dc, (sizes["dc"], moves), "dc")
-    along_t = shaped(dt, (count, moves), "dt")
-    fixed = {"p": numbers.p, "c": numbers.c}
-    varying = {
-        "t": shaped(t, (count,), "t"),
-        "x": shaped(x, (count, sizes["dx"]), "x"),
-        "u": shaped(u, (count, sizes["du"]), "u"),
-    }
+    there = {name: shaped(value, shapes[name], name) for name, value in given.items()}
+    along = {f"d{name}": shaped(value, (*shapes[name], moves), f"d{name}") for name, value in moved.items()}
     parts = []
     for rows in rows_of(model, of):
         loop = model.loop(f"{rows.function}_tangent", ("t", "x", "u", "dt", "dx", "du"))
         (result,) = loop.function.name_out()
         part = np.empty((count, len(rows.indices), moves))
         for m in range(moves):
-            moved = {
-                "dt": along_t[:, m],
-                "dx": along_x[:, :, m],
-                "du": along_u[:, :, m],
-                "dp": along_p[:, m],
-                "dc": along_c[:, m],
-            }
-            part[:, :, m] = loop(count, {**fixed, **varying, **moved})[result][:, rows.indices]
+            way = {name: one[..., m] for name, one in along.items()}
+            part[:, :, m] = loop(count, there | way)[result][:, rows.indices]
         parts.append(part)
     return np.concatenate(parts, axis=1)

@@ -120,22 +120,17 @@ class JacobianFunction:
         for argument in ARGUMENTS:
             name, along = f"{rows.function}_jac_{argument}", directions.of(argument) != 0.0
             if model.has(name) and np.any(along):
-                block = _pattern(model.function(name))
-                pattern |= (block[rows.indices].astype(int) @ along.astype(int)) > 0
+                block = casadi.DM.ones(model.function(name).sparsity_out(0)).full()
+                pattern |= (block[rows.indices] @ along) > 0.0
         starts = np.concatenate([[0], np.cumsum(pattern.sum(axis=0))])
         column, row = np.nonzero(pattern.T)
         self.sparsity = Sparsity(shape=shape, starts=starts, rows=row)
         name = f"{rows.function}_jac_x"
         if self._by_states and model.has(name):
             function = model.function(name)
-            # column-major position of each entry of the block among its nonzeros
-            block_rows, block_columns = (np.array(k, dtype=int) for k in function.sparsity_out(0).get_triplet())
-            order = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(block_rows, block_columns, strict=True))}
-            state = np.argmax(directions.x, axis=0)
-            entries = [
-                order[int(rows.indices[r]), int(state[c])] for r, c in zip(row.tolist(), column.tolist(), strict=True)
-            ]
-            return function, np.array(entries, dtype=np.int64)
+            nonzeros, state = function.sparsity_out(0), np.argmax(directions.x, axis=0)
+            places = zip(rows.indices[row].tolist(), state[column].tolist(), strict=True)
+            return function, np.array([nonzeros.get_nz(*place) for place in places], dtype=np.int64)
         single = model.function(f"{rows.function}_tangent")
         size, count = single.size1_out(0), shape[1]
         if count > 1:
@@ -210,11 +205,3 @@ class JacobianFunction:
         """
         pattern = self.sparsity
         return need("scipy.sparse").csc_array((self.values.copy(), pattern.rows, pattern.starts), shape=pattern.shape)
-
-
-def _pattern(function: casadi.Function) -> NDArray[np.bool_]:
-    sparsity = function.sparsity_out(0)
-    dense = np.zeros(sparsity.shape, dtype=bool)
-    rows, columns = sparsity.get_triplet()
-    dense[rows, columns] = True
-    return dense

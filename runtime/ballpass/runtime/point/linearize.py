@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -187,13 +187,9 @@ def linearize(
 
     Raises
     ------
-    RequestError
-        No bearing.
     SimulationError
         The derivatives are not finite there.
     """
-    if not model.has("rhs"):
-        raise RequestError("linearize: this model has no equations of motion. A scene with [bearing] is expected.")
     there = point(model, numbers, t, x)
     count = len(model.states)
     half = count // 2
@@ -242,11 +238,9 @@ def _faster_damping(
     passing, reach = 0.0, np.zeros(half)
     for bearing in model.manifest.bearings:
         if bearing.damping.corner_at_rest:
-            rate = float(np.max(np.abs(Deflections(model, bearing, there).rate)))
-            passing = max(passing, rate)
-            (rows,) = rows_of(model, f"{bearing.prefix}ball.deflection")
-            by_states = model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
-            reach = np.maximum(reach, np.max(np.abs(by_states[:, :half]), axis=0))
+            balls = Deflections(model, bearing, there)
+            passing = max(passing, float(np.max(np.abs(balls.rate))))
+            reach = np.maximum(reach, np.max(np.abs(balls.by_positions), axis=0))
     found = damping.copy()
     for k, moved in enumerate(reach.tolist()):
         # the driver's speed is no vibration

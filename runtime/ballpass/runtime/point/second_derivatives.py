@@ -22,7 +22,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
+from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, STATES, TIME, directions_of, rows_of, turning_speed
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.turning import Turning
 
@@ -55,40 +55,31 @@ def hessian(
     time = checked_time(t)
     parts = rows_of(model, of)
     directions_of(model, numbers, list(wrt), time)  # the names are refused as they are for first derivatives
-    for name in wrt:
-        if name == "states":
-            raise RequestError("hessian: wrt takes two names; 'states' stands for several. Name the states.")
+    if STATES in wrt:
+        raise RequestError("hessian: wrt takes two names; 'states' stands for several. Name the states.")
     _refuse_unbounded(model, [label for part in parts for label in part.labels], [part.function for part in parts])
     there = point(model, numbers, time, x)
-    symbols = {
-        "moved": ca.SX.sym("moved"),
-        "turned": ca.SX.sym("turned"),
-        "x": ca.SX.sym("x", len(model.states)),
-        "p": ca.SX.sym("p", len(numbers.p)),
-    }
-    values = [0.0, 0.0, there["x"], numbers.p]
-    first, second = (_symbol(model, numbers, symbols, name) for name in wrt)
-    c = model.symbolic("constants")(symbols["p"]) if model.manifest.constants else ca.SX(0, 1)
-    known = {info.name: symbols["p"][k] for k, info in enumerate(model.manifest.parameters)}
+    sizes = {"moved": 1, "turned": 1, "states": len(model.states), "p": len(numbers.p)}
+    symbols = moved, turned, states, p = [ca.SX.sym(name, size) for name, size in sizes.items()]
+    c = model.symbolic("constants")(p) if model.manifest.constants else ca.SX(0, 1)
+    known = {info.name: p[k] for k, info in enumerate(model.manifest.parameters)}
     known |= {info.name: c[k] for k, info in enumerate(model.manifest.constants)}
+    named = {**known, TIME: moved, CRANK_ANGLE: turned, **{name: states[k] for k, name in enumerate(model.states)}}
     u = ca.vertcat(*(_input(item, known, model, numbers, time) for item in model.manifest.inputs))
-    local = symbols["moved"]
     if CRANK_ANGLE in wrt:
         turning_speed(model, numbers, time)
         info = timeline.driver_info(model.manifest)
         assert info is not None  # something turns
         _, rate, slope = _turned(info, known, numbers.values, time)
-        passed = symbols["turned"] / rate
-        local = local + passed - 0.5 * slope / rate * passed**2
-    arguments = {"t": local, "x": symbols["x"], "u": ca.SX(u), "p": symbols["p"], "c": c}
+        passed = turned / rate
+        moved = moved + passed - 0.5 * slope / rate * passed**2
+    arguments = {"t": moved, "x": states, "u": ca.SX(u), "p": p, "c": c}
     found = []
     for part in parts:
         graph = model.symbolic(part.function)
-        value = graph(*(arguments[name] for name in graph.name_in()))[part.indices.tolist()]
-        twice = ca.jacobian(ca.jacobian(value, first), second)
-        function = ca.Function("twice", [*symbols.values()], [ca.densify(twice)])
-        found.append(function(*values).full().ravel())
-    result = np.concatenate(found)
+        found.append(graph(*(arguments[name] for name in graph.name_in()))[part.indices.tolist()])
+    twice = ca.jacobian(ca.jacobian(ca.vertcat(*found), named[wrt[0]]), named[wrt[1]])
+    result = ca.Function("twice", symbols, [ca.densify(twice)])(0.0, 0.0, there["x"], numbers.p).full().ravel()
     if not np.all(np.isfinite(result)):
         raise SimulationError("hessian: the second derivatives are not finite here. Check state and parameters.")
     single = isinstance(of, str) and of != RHS and len(result) == 1
@@ -105,16 +96,6 @@ def _refuse_unbounded(model: LoadedModel, labels: Sequence[str], functions: Sequ
             'surroundings. Take the smoothed law: smoothing = "0.05 um" in [bearing.contact], for a one-sided damping '
             'law also smoothing = "1 mm/s" in [bearing.damping].'
         )
-
-
-def _symbol(model: LoadedModel, numbers: Numbers, symbols: dict[str, ca.SX], name: str) -> ca.SX:
-    if name == TIME:
-        return symbols["moved"]
-    if name == CRANK_ANGLE:
-        return symbols["turned"]
-    if name in model.states:
-        return symbols["x"][model.states.index(name)]
-    return symbols["p"][list(numbers.parameters).index(name)]
 
 
 def _input(item: InputInfo, known: dict[str, ca.SX], model: LoadedModel, numbers: Numbers, t: float) -> ca.SX:

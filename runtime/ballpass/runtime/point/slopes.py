@@ -142,6 +142,7 @@ class Deflections:
     ----------
     value : deflection of each ball [m]
     rate : its rate [m/s]
+    by_positions : derivative of each by the coordinates, shape (balls, coordinates) [1]
     speed : largest speed in it [m/s]
     """
 
@@ -150,7 +151,7 @@ class Deflections:
         (self._rows,) = rows_of(model, f"{bearing.prefix}ball.deflection")
         self._jumps = bearing.damping.in_deflection == "discontinuous"
         self.value = model.kernel(self._rows.function)(there)[self._rows.indices]
-        self.rate, by_time = self._rates(there)
+        self.rate, self.by_positions, by_time = self._rates(there)
         half = len(model.states) // 2
         self.speed = max(float(np.max(np.abs(np.asarray(there["x"])[half:]))), float(np.max(np.abs(by_time))), 1e-12)
 
@@ -179,8 +180,8 @@ class Deflections:
         least = 1e-6 * ON_THE_KINK * self.speed / step
         return 2.0 * ON_THE_KINK * self.speed / fastest if fastest > least else 0.0
 
-    def _rates(self, there: Point) -> tuple[Array, Array]:
-        """Rate of each deflection, and the part of it that is due to time alone."""
+    def _rates(self, there: Point) -> tuple[Array, Array, Array]:
+        """Rate of each deflection, its derivative by the coordinates, and the part that is due to time alone."""
         rows, x = self._rows, np.asarray(there["x"])
         half = len(x) // 2
         by_states = self._model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
@@ -188,8 +189,7 @@ class Deflections:
         by_time = np.zeros(len(rows.indices))
         if self._model.has(name):
             by_time = self._model.kernel(name)(there)[rows.indices]
-        rates: Array = by_states[:, :half] @ x[half:] + by_time
-        return rates, by_time
+        return np.asarray(by_states[:, :half] @ x[half:] + by_time), by_states[:, :half], by_time
 
 
 def named(bearing: BearingInfo, balls: Sequence[int]) -> str:

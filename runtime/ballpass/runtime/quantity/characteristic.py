@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
-from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.ratings.of_bearing import contact_cosine
 from ballpass.runtime.solution.solution import Solution
 from ballpass.runtime.time import timeline
@@ -39,6 +38,26 @@ PASS_SPEEDS = ("outer_pass_speed", "inner_pass_speed")
 
 #: Channels of a linkage begin with these.
 LINKAGE = ("reaction.", "drive_", "driver.", "body.", "point.", "spring.", "stop.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KinematicFrequencies:
+    """Frequencies of a ball bearing whose inner ring turns [Hz].
+
+    Attributes
+    ----------
+    shaft : turns of the inner ring
+    cage : turns of the cage (FTF)
+    ball_pass_outer : balls over a point of the outer ring (BPFO)
+    ball_pass_inner : balls over a point of the inner ring (BPFI)
+    ball_spin : turns of a ball about itself, seen from the cage (BSF); a spot on it meets a ring at twice this
+    """
+
+    shaft: float
+    cage: float
+    ball_pass_outer: float
+    ball_pass_inner: float
+    ball_spin: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,11 +109,12 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
 
     Parameters
     ----------
-    values : parameters and derived constants by name
+    values : parameters and derived constants by name; complex as `timeline.along` moves them
     """
-    at = bearing.path
-    speeds = (values[f"{at}.cage_speed"], values.get(f"{at}.outer_pass_speed"), values[f"{at}.inner_pass_speed"])
-    cage, outer, inner = (abs(speeds[0] if v is None else v) / TURN for v in speeds)
+    at, speed = bearing.path, values[f"{bearing.path}.cage_speed"]
+    speeds = (speed, values.get(f"{at}.outer_pass_speed", speed), values[f"{at}.inner_pass_speed"])
+    # the size of a complex number has no such derivative
+    cage, outer, inner = ((-speed if speed.real < 0.0 else speed) / TURN for speed in speeds)
     return KinematicFrequencies(
         shaft=abs(values[bearing.ring_speed]) / TURN,
         cage=cage,

@@ -67,7 +67,9 @@ def _competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
     """The extreme that the smallest change of a parameter puts in place of this one."""
     signal = view.signals[quantity.channel]
     best, slope = signal.value[mark.node, mark.ball], signal.slope[mark.node, mark.ball]
-    scales = np.array([_scale(view, name) for name in view.names])
+    units = {info.name: info.unit for info in view.manifest.parameters}
+    # of an angle a radian
+    scales = np.array([1.0 if units[name] == "rad" else abs(view.numbers.parameters[name]) for name in view.names])
     nearest, words = NEAR, ""
     together = range(signal.value.shape[1] if quantity.ball is None else 0)  # balls that share the load of that moment
     for other in (*(replace(mark, ball=ball) for ball in together if ball != mark.ball), *mark.competing):
@@ -96,9 +98,3 @@ def _competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
 
 def _words(view: View, quantity: Quantity, text: str) -> str:
     return bearing_words(text, view.manifest.bearings, quantity.channel)
-
-
-def _scale(view: View, name: str) -> float:
-    """Scale of a change of a parameter: its value; of an angle a radian."""
-    unit = next(info.unit for info in view.manifest.parameters if info.name == name)
-    return 1.0 if unit == "rad" else abs(view.numbers.parameters[name])

@@ -123,7 +123,7 @@ def _parsed(
     form = _FORM.fullmatch(str(text))
     if form is None:
         _explain_alone(manifest, channels, text, whole)
-        known = _usable(manifest, channels)
+        known = [name for name, (kind, _) in names.items() if kind.place is None or kind.at_rest]
         raise RequestError(f"{unknown_name('quantity', text, known)} Its form is kind:output, as in max:ball.force.")
     found = _kind_of(text)
     assert found is not None  # a form has a kind
@@ -224,11 +224,6 @@ def _check_place(manifest: Manifest | None, text: str, kind: Kind, place: str) -
         raise RequestError(
             f"{text}: after @ {kind.place.words} is expected, not {place!r}. Example: {kind.place.example}."
         )
-
-
-def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
-    """Names of quantities without a ball or place, for suggestions."""
-    return [name for name, (kind, _) in _names(manifest, channels).items() if kind.place is None or kind.at_rest]
 
 
 def quantity_words(manifest: Manifest, quantity: Quantity) -> str:

@@ -310,7 +310,8 @@ class NodeLayer:
             return np.zeros(0)
         values, rates = self._deflections.with_rates(layout.track, run.numbers)
         # where a body leaves a stop faster than the stop expands, its force stays at zero
-        stops, numbers = {stop: _hysteresis(stop) for stop in self.model.manifest.stops}, run.numbers.parameters
+        numbers = run.numbers.parameters
+        stops = {stop: "mechanism.{}s.{}.hysteresis".format(*stop.split(".")) for stop in self.model.manifest.stops}
         columns = {stop: self._deflections.column(stop) for stop in stops}
         clips = [1.0 + numbers[name] * rates[:, [columns[stop]]] for stop, name in stops.items() if name in numbers]
         every, forces = [values, *clips], np.zeros((len(values), 0))
@@ -396,12 +397,6 @@ def _taking_part(item: Quantity, forces: Array) -> NDArray[np.bool_]:
         return np.zeros(forces.shape, dtype=bool)
     top = np.max(forces, axis=1, keepdims=True)
     return np.asarray(forces >= top - NEAR_TOP * np.abs(top))
-
-
-def _hysteresis(stop: str) -> str:
-    """Parameter of a stop, by its compression, as ``stop.wall.compression``."""
-    kind, name, _ = stop.split(".")
-    return f"mechanism.{kind}s.{name}.hysteresis"
 
 
 def _is_of_balls(quantity: Quantity) -> bool:

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +18,12 @@ from ballpass.runtime.contract.manifest import Manifest, TurningInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.units import FAR_ANGLE, MOST_ANGLE
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
-from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import PASS_SPEEDS, frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
-from ballpass.runtime.ratings.of_bearing import bearing_words, contact_cosine
+from ballpass.runtime.ratings.of_bearing import bearing_words
 from ballpass.runtime.time import timeline
 from ballpass.runtime.time.repetition import Repetition
-from ballpass.runtime.time.turning import TURN, Turning
+from ballpass.runtime.time.turning import STEP, TURN, Turning
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
 
@@ -35,6 +36,10 @@ _FREQUENCIES = {
     "bpfi": "ball_pass_inner",
     "bsf": "ball_spin",
 }
+
+
+#: Numbers of a bearing that these follow from.
+_NUMBERS = ("cage_speed", *PASS_SPEEDS, "ball_diameter", "pitch_diameter", "cos_contact_angle")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,25 +174,14 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
         order = 1.0 if form is None else float(form["number"])
         return order * abs(speed) / TURN, order * math.copysign(1.0, speed) * faster / TURN
     bearing = quantity.bearing(manifest)
-    at, what = bearing.path, _FREQUENCIES[place]
-    frequency = float(getattr(frequencies_of(bearing, values), what))
-    if what == "ball_pass_inner":
-        of = f"{at}.inner_pass_speed"
-    elif what != "cage" and f"{at}.outer_pass_speed" in values:  # of an outer ring that turns
-        of = f"{at}.outer_pass_speed"
-    else:
-        of = f"{at}.cage_speed"
-    moving = _rate_slopes(view, of)
-    slope = frequency / values[of] * moving if values[of] else 0.0 * moving
-    if what == "ball_spin":  # in proportion to cos(contact angle) + pitch/ball
-        ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
-        ratio = values[pitch] / values[ball]
-        moved = (view.slopes(pitch) - ratio * view.slopes(ball)) / values[ball]
-        angled = f"{at}.cos_contact_angle"
-        if angled in values:
-            moved = moved + view.slopes(angled)
-        slope = slope + frequency / (contact_cosine(bearing, values) + ratio) * moved
-    return frequency, slope
+    names = (f"{bearing.path}.{name}" for name in _NUMBERS)
+    slopes = {name: _rate_slopes(view, name) for name in names if name in values}
+
+    def read(numbers: Mapping[str, Any]) -> Any:
+        return getattr(frequencies_of(bearing, numbers), _FREQUENCIES[place])
+
+    moved = ({name: slope[k] for name, slope in slopes.items()} for k in range(view.directions))
+    return read(values), np.array([np.imag(read(timeline.along(values, one))) / STEP for one in moved])
 
 
 def _rate_slopes(view: View, rate: str) -> Array:

@@ -331,9 +331,7 @@ def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
     kind = kind_of(quantity)
     assert kind.reduced is not None
     time = ball = None
-    if kind.extremes:
-        which = kind.extremes[0]
-        if len(kind.extremes) == 1:
-            time = float(runs.entry(f"{which}_time", quantity.channel)[0])
-            ball = int(runs.entry(f"{which}_ball", quantity.channel)[0]) or None
+    if len(kind.extremes) == 1:
+        time = float(runs.entry(f"{kind.extremes[0]}_time", quantity.channel)[0])
+        ball = int(runs.entry(f"{kind.extremes[0]}_ball", quantity.channel)[0]) or None
     return Estimate(value=float(kind.reduced(runs, quantity)[0]), slope=np.zeros(0), time=time, ball=ball)

@@ -239,10 +239,7 @@ class ChannelValues:
         found: dict[str, Array] = {}
         if self._more:
             every = self._own_loop("more", self._more_rows)(count, given)["g"]
-            column = 0
-            for name, size in self._columns[len(self._outputs) :]:
-                found[name] = every[:, column : column + size]
-                column += size
+            found = _split(every, self._columns[len(self._outputs) :])
         if not self._outputs:
             return found
         infos = self._model.manifest.outputs
@@ -276,13 +273,8 @@ class ChannelValues:
             here = loop(count, given | {f"{name}_way": seed for name, seed in zip(given, seeds, strict=True)})
             values.append(here["g"])
             slopes.append(here["g_way"].reshape(count, -1, directions))
-        value, slope = np.concatenate(values), np.concatenate(slopes)
-        found, column = {}, 0
-        for name, size in self._columns:
-            columns = slice(column, column + size)
-            found[name] = Signal(value=value[:, columns], slope=slope[:, columns])
-            column += size
-        return found
+        value, slope = (_split(np.concatenate(one), self._columns) for one in (values, slopes))
+        return {name: Signal(value=value[name], slope=slope[name]) for name in value}
 
     def _own_loop(
         self, name: str, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], directions: int = 0
@@ -325,8 +317,7 @@ class ChannelValues:
     def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         found = []
         if self._outputs:
-            outputs = self._model.symbolic("outputs")
-            results = outputs.call([inputs[name] for name in outputs.name_in()])
+            results = self._results("outputs", inputs)
             order = [info.name for info in self._model.manifest.outputs]
             found = [results[order.index(info.name)] for info in self._outputs]
         return found + self._more_rows(inputs)
@@ -337,17 +328,23 @@ class ChannelValues:
         moved = casadi.vertcat(1.0, x[half:], casadi.SX.zeros(half))
         lags = [half + k for k, one in enumerate(coordinates) if one.kind == "lag"]  # velocities that are angles
         if lags:
-            rhs = self._model.symbolic("rhs")
-            moved[[1 + k for k in lags]] = rhs.call([inputs[name] for name in rhs.name_in()])[0][lags]
+            moved[[1 + k for k in lags]] = self._results("rhs", inputs)[0][lags]
         return [values, casadi.jtimes(values, casadi.vertcat(inputs["t"], x), moved)]
 
     def _more_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
-        found = []
-        for rows in self._more:
-            group = self._model.symbolic(rows.function)
-            every = group.call([inputs[name] for name in group.name_in()])[0]
-            found.append(every[rows.indices.tolist()])
+        return [self._results(rows.function, inputs)[0][rows.indices.tolist()] for rows in self._more]
+
+    def _results(self, function: str, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        """Results of a generated function as expressions."""
+        graph = self._model.symbolic(function)
+        found: list[casadi.SX] = graph.call([inputs[name] for name in graph.name_in()])
         return found
+
+
+def _split(every: Array, columns: Sequence[tuple[str, int]]) -> dict[str, Array]:
+    """Columns of each channel, by its name."""
+    ends = np.cumsum([size for _, size in columns])[:-1]
+    return dict(zip((name for name, _ in columns), np.split(every, ends, axis=1), strict=True))
 
 
 def _rows(model: LoadedModel, channel: str) -> list[Rows]:

@@ -59,12 +59,9 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     '12.79 kN'
     """
     element, geometry = rated_element(bearing), geometry_of(bearing, values)
-    taken = bearing.catalogue
-    dynamic = None if taken is None else taken.dynamic_rating
-    static = None if taken is None else taken.static_rating
-    limit = None if taken is None else taken.fatigue_limit
-    numbers = {"dynamic_rating": dynamic, "static_rating": static, "fatigue_limit": limit}
-    given = tuple(name for name, value in numbers.items() if value is not None)
+    names = ("dynamic_rating", "static_rating", "fatigue_limit")
+    dynamic, static, limit = (getattr(bearing.catalogue, name, None) for name in names)
+    given = tuple(name for name, value in zip(names, (dynamic, static, limit), strict=True) if value is not None)
     dynamic = element.dynamic_rating(geometry) if dynamic is None else dynamic
     static = element.static_rating(geometry) if static is None else static
     limit = element.fatigue_limit(static, geometry.pitch) if limit is None else limit
@@ -160,19 +157,6 @@ def why_no_life(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: fl
     )
 
 
-def refuse_swinging(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed: float) -> None:
-    """RequestError where `why_no_life` has a reason."""
-    reason = why_no_life(bearing, values, shaft_speed)
-    if reason:
-        others = "the life of a bearing that turns, or max:ball.force"
-        raise RequestError(f"{bearing.prefix}life: {reason} Allowed: {others}.")
-
-
-def geometry_is_assumed(bearing: BearingInfo, values: Mapping[str, Any]) -> bool:
-    """Whether the scene gives a stiffness, so that grooves and steel are the reference ones of ISO 76."""
-    return rated_element(bearing).is_assumed(geometry_of(bearing, values))
-
-
 def contacts_of(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[RacewayContact, RacewayContact]:
-    """Contacts with inner and outer ring; see `geometry_is_assumed`."""
+    """Contacts with inner and outer ring; of a scene that gives a stiffness those of ISO 76's grooves and steel."""
     return rated_element(bearing).contacts(geometry_of(bearing, values))

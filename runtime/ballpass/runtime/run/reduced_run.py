@@ -1,6 +1,6 @@
 """A run of the project's own stepper that keeps reductions only, in bounded memory.
 
-In: a `Run`, or a model, numbers and a request.  Out: `Reductions`.
+In: a `Run`.  Out: `Reductions`.
 """
 
 from __future__ import annotations
@@ -10,26 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.request.request import Request
-from ballpass.runtime.request.resolve import Run, resolve
+from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.run.loop import ReductionRow, RunUnderWay, start_run
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
 
 
-def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
-    """Integrate and reduce; what the request leaves open is taken from the scene's run settings.
+def reduced(run: Run) -> Reductions:
+    """Reductions of the steady turns of a run.
 
     Raises
     ------
     RequestError
-        A wrong request.
+        The run ends within its transient.
     SimulationError
         The computation failed.
     """
-    going = start_reducing(resolve(model, numbers, request), channel_names(model.manifest))
+    going = start_reducing(run, channel_names(run.model.manifest))
     going.go_on()
     return going.reductions()
 

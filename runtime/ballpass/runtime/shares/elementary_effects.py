@@ -68,20 +68,15 @@ def elementary_effects(shares: np.ndarray, base: np.ndarray, other: np.ndarray, 
     for column, one in zip(shares.T, other, strict=True):
         known = np.isfinite(one) & np.isfinite(base)
         changes = (one[known] - base[known]) / ((column + STEP) % 1.0 - column)[known]
-        if len(changes) < 2:
-            nan, rows = math.nan, len(changes)
-            found.append(ElementaryEffect(size=nan, size_low=nan, size_high=nan, mean=nan, deviation=nan, rows=rows))
-            continue
-        again = np.mean(random.choice(np.abs(changes), (RESAMPLES, len(changes))), axis=1)
-        low, high = np.percentile(again, (2.5, 97.5)).tolist()
-        found.append(
-            ElementaryEffect(
-                size=float(np.mean(np.abs(changes))),
-                size_low=low,
-                size_high=high,
-                mean=float(np.mean(changes)),
-                deviation=float(np.std(changes)),
-                rows=len(changes),
-            )
-        )
+        values = dict.fromkeys(_NUMBERS, math.nan)
+        if len(changes) > 1:
+            size = np.abs(changes)
+            again = np.mean(random.choice(size, (RESAMPLES, len(changes))), axis=1)
+            low, high = np.percentile(again, (2.5, 97.5)).tolist()
+            numbers = (np.mean(size), low, high, np.mean(changes), np.std(changes))
+            values = dict(zip(_NUMBERS, map(float, numbers), strict=True))
+        found.append(ElementaryEffect(**values, rows=len(changes)))
     return found
+
+
+_NUMBERS = ("size", "size_low", "size_high", "mean", "deviation")

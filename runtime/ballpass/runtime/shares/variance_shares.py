@@ -56,10 +56,9 @@ class VarianceShare:
         >>> found.quantities[0].shares[0].borne.total_high
         1.0
         """
-        first, total = ((getattr(self, f"{kind}_low"), getattr(self, f"{kind}_high")) for kind in ("first", "total"))
-        total_high = float(np.clip(total[1], 0.0, 1.0))
-        first_low, first_high = np.clip(first, 0.0, total_high).tolist()
-        total_low = float(np.clip(total[0], first_low, total_high))
+        total_high = float(np.clip(self.total_high, 0.0, 1.0))
+        first_low, first_high = np.clip((self.first_low, self.first_high), 0.0, total_high).tolist()
+        total_low = float(np.clip(self.total_low, first_low, total_high))
         first_now = float(np.clip(self.first, first_low, first_high))
         total_now = float(np.clip(self.total, total_low, total_high))
         numbers = (first_now, first_low, first_high, total_now, total_low, total_high)

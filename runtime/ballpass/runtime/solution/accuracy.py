@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.show.short import ShortRepr
 
@@ -46,11 +44,6 @@ class Accuracy(ShortRepr):
     tried: tuple[tuple[str, float], ...]
     time: float
     check_time: float
-
-    def plain(self) -> dict[str, Any]:
-        """Plain data for JSON; an estimate that is infinite becomes None."""
-        plain: dict[str, Any] = finite(asdict(self))
-        return plain
 
     @property
     def words(self) -> str:

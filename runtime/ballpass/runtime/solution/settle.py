@@ -24,7 +24,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.report.numbers import rounded
 from ballpass.runtime.request.request import Request
 from ballpass.runtime.request.resolve import Run, asked_span, resolve
-from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
+from ballpass.runtime.run.reduced_run import ReducedRun, reduced, start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names, joined
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
@@ -99,7 +99,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
 
     Parameters
     ----------
-    request : its length is left out
+    request : without a length
     most : steady turns
 
     Raises
@@ -109,8 +109,6 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     SimulationError
         The computation failed.
     """
-    if request.cycles is not None or request.duration is not None:
-        raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     repetition = Repetition.of(model.manifest, numbers.values)
     turn = repetition.turn
     slowest = math.ceil(max(repetition.slowest_load, repetition.slowest_beat(MOST_RUN // 2 * turn)) / turn)
@@ -175,13 +173,6 @@ def doubled(span: Span, turns: float, most: float) -> Iterator[float]:
     while turns <= most:
         yield span.counting(turns).end
         turns *= 2
-
-
-def reduced(run: Run) -> Reductions:
-    """Reductions of the steady turns of a run."""
-    going = start_reducing(run, channel_names(run.model.manifest))
-    going.go_on()
-    return going.take()
 
 
 def look_beyond(run: Run, few: Reductions | None = None, turns: int | None = None) -> Settled | None:

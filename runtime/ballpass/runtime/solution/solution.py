@@ -341,17 +341,12 @@ def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
     }
     found["time"] = (("time",), solution.t, {"units": "s", "long_name": "time"})
     for name, samples in solution.outputs.items():
-        if samples.ndim == 1:
-            found[name] = (("time",), samples, _attributes(infos[name]))
-            continue
-        balls = _ball_dimension(manifest, name)
-        found[name] = (("time", balls), samples, _attributes(infos[name]))
-        numbers = np.arange(1, samples.shape[1] + 1)
-        found[balls] = (
-            (balls,),
-            numbers,
-            {"units": "1", "long_name": bearing_words("number of the ball", manifest.bearings, name)},
-        )
+        prefix = next((b.prefix for b in manifest.bearings if name.startswith(b.prefix)), "")
+        balls = (f"{prefix}ball",) * (samples.ndim - 1)  # named bearings have axes of their own
+        found[name] = (("time", *balls), samples, _attributes(infos[name]))
+        for axis in balls:
+            words = bearing_words("number of the ball", manifest.bearings, name)
+            found[axis] = (balls, np.arange(1, samples.shape[1] + 1), {"units": "1", "long_name": words})
     facts: dict[str, Any] = {
         "title": manifest.title,
         "scene": manifest.scene,
@@ -369,12 +364,6 @@ def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
         "ballpass_manifest": manifest.to_json(),
     }
     return found, facts
-
-
-def _ball_dimension(manifest: Manifest, output: str) -> str:
-    """Axis of an output that has a value for each ball: ``ball``, or ``<name>.ball`` where bearings have names."""
-    prefix = next((b.prefix for b in manifest.bearings if output.startswith(b.prefix)), "")
-    return f"{prefix}ball"
 
 
 def _facts(reductions: Reductions | None) -> dict[str, Any] | None:

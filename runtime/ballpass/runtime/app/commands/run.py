@@ -262,7 +262,7 @@ def _answer(
         summary["quantities"] = {name: asdict(one) for name, one in found.items()}
         parts.append(render_quantities(model.manifest, summary["quantities"]))
     if solution.accuracy is not None:
-        summary["accuracy"] = solution.accuracy.plain()
+        summary["accuracy"] = asdict(solution.accuracy)
     if longer is not None:
         words, found_turned = add_turns(summary, longer, model.manifest, *turned, instead=settle)
         parts, turned[:] = [*parts, words], [found_turned]

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from ballpass.runtime.quantity.location import INSTANT, check_instant
-from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
+from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 
 
 def _at_moment(view: View, quantity: Quantity) -> Estimate:
     mark = view.marks[quantity.name, "place"]
     value, slope = view.channel(quantity)
     return Estimate(value=float(value[mark.node]), slope=slope[mark.node], time=mark.time)
-
-
-def _at_end(runs: ReducedRuns, quantity: Quantity) -> Array:
-    return runs.end[:, runs.layout.states.index(quantity.channel)].copy()
 
 
 KINDS = (
@@ -32,7 +28,7 @@ KINDS = (
         words="at the end",
         evaluate=_at_moment,
         at_moment=True,
-        reduced=_at_end,
+        reduced=lambda runs, quantity: runs.end[:, runs.layout.states.index(quantity.channel)].copy(),
         needs=lambda _channel: (),
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ballpass.runtime.quantity.extreme_value import ball_of, extreme, rank_change
-from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
+from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 
 #: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -51,10 +51,6 @@ def _range(view: View, quantity: Quantity) -> Estimate:
     )
 
 
-def _reduced_range(runs: ReducedRuns, quantity: Quantity) -> Array:
-    return runs.entry("max", quantity.channel) - runs.entry("min", quantity.channel)
-
-
 def _value_kind(name: str, size: str, words: str, also: tuple[str, ...] = ()) -> Kind:
     return Kind(
         name=name,
@@ -90,7 +86,7 @@ KINDS = (
         summary="largest less smallest value",
         evaluate=_range,
         extremes=("max", "min"),
-        reduced=_reduced_range,
+        reduced=lambda runs, quantity: runs.entry("max", quantity.channel) - runs.entry("min", quantity.channel),
         rows=("max", "min"),
     ),
     _time_kind("peak_time", "max", "largest", "highest"),

@@ -13,13 +13,14 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.manifest import BearingInfo, Manifest
 from ballpass.runtime.native.reduction_rows import SECTORS, TURNED
 from ballpass.runtime.quantity.cuts import PLACES
 from ballpass.runtime.quantity.panels import GAUSS, WEIGHTS
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.life import KILO, ElementLife, raceway_life
-from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
+from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, why_no_life
 from ballpass.runtime.run.reductions import raceway_powers
 from ballpass.runtime.time.timeline import set_moving, shaft_speed
 from ballpass.runtime.time.turning import TURN
@@ -62,8 +63,10 @@ def _rings(ratings: Ratings) -> tuple[Any, Any]:
 
 
 def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
-    moving = {**values, **set_moving(manifest, values)}
-    refuse_swinging(quantity.bearing(manifest), moving, shaft_speed(manifest, moving))
+    bearing, moving = quantity.bearing(manifest), {**values, **set_moving(manifest, values)}
+    if reason := why_no_life(bearing, moving, shaft_speed(manifest, moving)):
+        others = "the life of a bearing that turns, or max:ball.force"
+        raise RequestError(f"{bearing.prefix}life: {reason} Allowed: {others}.")
 
 
 def _moved(dual: Dual) -> NDArray[np.complex128]:
