@@ -216,6 +216,7 @@ support = "fixed"
 STEADY = '[run]\ncycles = 2\ntransient_cycles = 0\nrtol = 1e-11\nsamples_per_cycle = 100\noutputs = ["inner.*"]\n'
 
 
+@pytest.mark.long
 def test_a_bearing_loaded_one_way_turns_with_its_wheel(model_of: Callable[..., Model]) -> None:
     """At the axis of a wheel under a constant torque it is one on a shaft of the wheel's speed, under its reaction."""
     machine = linkage_text(two_wheels(30.0))

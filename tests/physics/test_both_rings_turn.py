@@ -70,6 +70,7 @@ def test_at_rest_it_is_the_bearing_seen_from_its_outer_ring(both: Model, model_o
         assert one.ball_force == pytest.approx(two.ball_force, rel=1e-7, abs=1e-6 * np.max(two.ball_force))
 
 
+@pytest.mark.long
 def test_rings_of_unlike_speeds_have_a_life(both: Model) -> None:
     """The load turns against both rings; turns of one against the other are hours at the difference of speeds."""
     (bearing,) = both.life(cycles=60, transient=20).bearings

@@ -46,6 +46,7 @@ joint = "A"
 FRICTION = 'viscous = "0.02 N*m*s/rad"\ntorque = "0.8 N*m"\nsmoothing = "0.5 rad/s"\n'
 
 
+@pytest.mark.long
 def test_a_wheel_runs_down_by_viscous_friction_exponentially_and_by_coulomb_friction_in_a_straight_line(
     tmp_path: Path,
 ) -> None:

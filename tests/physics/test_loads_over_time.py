@@ -124,6 +124,7 @@ def test_turns_of_a_scene_without_a_run_say_that_they_hold_no_period(
     assert warnings_of_transient(bare, {"loads.slow.frequency": 5.0}) == warnings_of_transient(slow, {}) == []
 
 
+@pytest.mark.long
 def test_a_load_slower_than_all_turns_is_not_settled(slow: Model) -> None:
     """It begins at 100 N and comes to 1900 N after an hour and a half."""
     slower = {"loads.slow.frequency": 1e-4}

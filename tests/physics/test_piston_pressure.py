@@ -69,6 +69,7 @@ def test_work_of_the_drive_is_the_area_of_both_indicator_diagrams(make_model: Ca
     assert float(weight @ torque) == pytest.approx(indicated, rel=1e-8)
 
 
+@pytest.mark.long
 def test_derivatives_by_bore_ambient_and_rows_are_verified(make_model: Callable[..., Model]) -> None:
     path = "mechanism.forces.gas_1"
     names = [f"{path}.bore", f"{path}.ambient", f"{path}.table.pressure.1", f"{path}.table.angle.18"]

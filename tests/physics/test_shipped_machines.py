@@ -11,6 +11,7 @@ import pytest
 from ballpass.runtime import Model
 
 
+@pytest.mark.long
 def test_work_of_the_pump_is_pressure_times_volume(make_model: Callable[..., Model]) -> None:
     """Less 0.3 % that the rise and fall of the pressure over 8 deg cost."""
     found = make_model("eccentric_pump").simulate(cycles=1)

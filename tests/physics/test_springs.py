@@ -107,6 +107,7 @@ def test_a_cubic_stiffness_goes_with_a_stiffness(scene_text: Callable[..., str])
     assert [fault.key for fault in caught.value.faults] == ["mechanism.springs.return.cubic_stiffness"]
 
 
+@pytest.mark.long
 def test_a_torsion_spring_of_a_body_that_swings_does_not_jump(make_model: Callable[..., Model]) -> None:
     """The lever swings from 66 to 114 degrees, on either side of half a turn from some of these free angles."""
     model = make_model("crank_shaper", *changes(TWIST), (OUTPUTS[0], OUTPUTS[1].replace('"spring.*", ', "")))
@@ -171,6 +172,7 @@ cycles = 3
 """
 
 
+@pytest.mark.long
 def test_a_torsion_spring_at_a_slow_wheel_jumps_half_a_turn_from_its_free_angle(
     model_of: Callable[..., Model],
 ) -> None:

@@ -112,6 +112,7 @@ def test_the_file_of_a_run_without_stated_turns_has_the_steady_ones(
     assert (asked.t[0], len(asked.t), len(asked.steady().t)) == (0.0, 6001, 2001)
 
 
+@pytest.mark.long
 def test_settling_drops_the_start(plain: Model) -> None:
     falling = {name: 0.0 for name in plain.parameters if name.startswith("bearing.initial.")}
     found = plain.settle(parameters=falling, transient=0)
@@ -138,6 +139,7 @@ def test_run_warns_of_an_extreme_in_its_first_turns(tmp_path: Path, monkeypatch:
 LIGHT = FOUR.replace("600 rpm", "6000 rpm").replace("2000 N*s/m", "20 N*s/m").replace("0.1 s/m", "1e-4 s/m")
 
 
+@pytest.mark.long
 def test_a_transient_of_more_than_fifty_turns_is_found(tmp_path: Path) -> None:
     """Turns 50 to 60 have 0.4 % more than the steady machine, which was not said."""
     model = made(tmp_path / "light", LIGHT)

@@ -248,6 +248,7 @@ CRANKED = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("driver", [DRIVER, DRIVER.replace('"40 deg"', '"500 deg"')])
 def test_springs_of_a_crank_rocker_follow_its_bodies_over_any_angle(
     model_of: Callable[..., Model], driver: str

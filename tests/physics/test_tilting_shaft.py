@@ -156,6 +156,7 @@ def test_energy_changes_by_the_work_of_unbalance_and_dampers(rotor: Model) -> No
     assert found == pytest.approx(work, abs=1e-6 * np.ptp(found))
 
 
+@pytest.mark.long
 def test_at_rest_two_bearings_carry_by_levers(model_of: Callable[..., Model]) -> None:
     """Whatever their stiffness: an overhung crank on two bearings is statically determinate."""
     levers = model_of(CRANK, "overhung_crank")

@@ -73,6 +73,7 @@ def test_so_many_turns_are_made_at_the_time_that_is_said(seed: int) -> None:
     assert (stops.after(0.375), stops.after(0.6)) == (0.5, math.inf)
 
 
+@pytest.mark.long
 def test_runs_of_turns_end_where_the_driver_has_made_them(press: Model, tmp_path: Path) -> None:
     """Simulated, reduced, continued, in lanes, and as a program of its own."""
     run = press.simulate(4.5, transient=1.5, samples_per_cycle=100)

@@ -219,6 +219,7 @@ outputs = ["inner.*", "point.rod.B.y"]
 """
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::ballpass.runtime.UnusualWarning")
 def test_play_that_brings_a_linkage_to_its_dead_centre_ends_the_run_with_the_reason(
     model_of: Callable[..., Model],

@@ -215,6 +215,7 @@ set.load.force.y = "-250 lbf"
 """
 
 
+@pytest.mark.long
 def test_a_duty_cycle_has_the_mean_load_and_basic_life_of_a_textbook(model_of: Callable[..., Model]) -> None:
     """650, 750 and 250 lbf for 30, 10 and 20 minutes of an hour: 597.05 lbf, and (7700/597.05)^3 million turns."""
     stated = THREE_LOADS + '[run]\nreliability = "95 %"\n'

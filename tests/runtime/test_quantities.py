@@ -395,6 +395,7 @@ def test_of_equal_peaks_of_a_periodic_torque_the_first_is_taken(make_model: Call
         assert pair.derivative == pytest.approx(slope, rel=1e-4), extreme
 
 
+@pytest.mark.long
 def test_lives_of_two_bearings_have_the_same_bits_in_runs_and_members(make_model: Callable[..., Model]) -> None:
     model = make_model("rotor_two_bearings")
     names = ["pulley.life", "free_end.life"]

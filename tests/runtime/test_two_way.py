@@ -59,6 +59,7 @@ def test_the_reaction_is_the_force_of_the_housing(press: Model) -> None:
         assert np.max(np.abs(run[f"reaction.A.{axis}"] - housing)) < 1e-11 * np.max(np.abs(run["reaction.A.y"]))
 
 
+@pytest.mark.long
 def test_the_bearing_carries_the_linkage(press: Model) -> None:
     """Along the guide a pair of bearings feels slider, rod and crank, not twice Eq. (3)'s 0.41 kg."""
     mass = press.linearize().mass

@@ -21,7 +21,7 @@ from ballpass.runtime.request.resolve import Run
 from ballpass.runtime.request.segments import time_resolution
 from ballpass.runtime.run.loop import Samples, start_run
 from ballpass.runtime.time import timeline
-from ballpass.runtime.time.turning import TURN, beside
+from ballpass.runtime.time.turning import TURN, beside, past
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ def load_samples(run: Run, turns: float | None = None) -> Mapping[str, LoadSampl
         force, x, y, outer, inner = (signals[bearing.prefix + name] for name in names)
         found[bearing.prefix] = LoadSamples(
             time=time,
-            crank=crank % TURN,
+            crank=past(crank),
             force=np.maximum(force, 0.0),
             resultant=np.hypot(x[:, 0], y[:, 0]),
             contact_angle=float(np.arccos(min(contact_cosine(bearing, numbers.values), 1.0))),
