@@ -108,7 +108,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/index.md": {
         "0.12 s with four": "the problem measured",
         "eight balls and 2 000 output points, at an error of 1e-3": "likewise",
-        "takes 0.237 ms, and 900× as long": "test_speeds_of_the_landing_page_are_those_of_the_benchmarks",
+        "takes 0.314 ms, and 873× as long": "test_speeds_of_the_landing_page_are_those_of_the_benchmarks",
     },
     "docs/tutorial.md": {
         "over 16 ball angles is 42 % lower, 15 %": "test_window_rise.py",
