@@ -285,7 +285,7 @@ def by_differences(
                 allowed = agreement * np.max(np.abs(sides), axis=0) + quantum[:, k] + 4.0 * noise / width[-1]
                 kinked = np.abs(sides[1] - sides[0]) > KINK * allowed
                 if expected is not None and some.stop < HALVINGS:
-                    enough = KNOWN * (agreement * np.abs(found.value) + quantum[:, k])
+                    enough = KNOWN * agreement * np.abs(found.value)  # without the quantum: nothing is then bounded
                     mine = mine & ~kinked & (fresh <= enough) & (np.abs(found.value - expected[:, k]) <= enough)
                     asked[place] = asked[place] & ~mine
                 better = mine & (fresh < known)
