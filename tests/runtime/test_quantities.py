@@ -195,6 +195,7 @@ phase = "25 deg" #"""
         assert not function.jacobian(function.start).any()
 
 
+@pytest.mark.long
 def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Model]) -> None:
     model = make_model("offset_slider")
     angle = math.radians(200.0)

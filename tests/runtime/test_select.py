@@ -22,6 +22,7 @@ def asked(*words: str) -> dict[str, dict[str, float]]:
     return {one["designation"]: one for one in json.loads(done.stdout)["candidates"]}
 
 
+@pytest.mark.long
 def test_a_candidate_is_the_scene_with_its_bearing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """6004 and 6204 in the place of the rotor's bearing, against files that were edited by hand."""
     monkeypatch.chdir(tmp_path)
